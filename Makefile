@@ -38,13 +38,13 @@ hot := -flto=auto -finline-limit=1000 -fipa-cp-clone --param=ipa-cp-eval-thresho
   --param=ipa-cp-unit-growth=200 --param=inline-unit-growth=200 -fno-trapping-math -fno-tree-vectorize
 cold := -O1
 CHECKS := $(if $(DEBUG),-fcheck=all$(comma)no-array-temps -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
-FFLAGS ?= $(if $(gnu),-std=f2008 -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument) -g $(OPT)
+FFLAGS ?= $(if $(gnu),-std=f2008 -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument) $(if $(DEBUG),-g) $(OPT)
 # Contraction off, whatever FFLAGS says: only then do all builds give the same bits. Position independent, because the program and
 # both libraries are linked from the same objects.
 flags = $(FFLAGS) -fPIC -ffp-contract=off $(if $(gnu),-fno-semantic-interposition -fopenmp $(CHECKS) -ffpe-summary=none)
 # gfortran compiles C, too, so that link-time optimisation can make an instruction of a prefetch.
 c_compiler = $(if $(gnu),$(FC),$(CC))
-c_flags = -Wall -Wextra -fPIC $(filter -O% -g -march=% -flto% -fsanitize% -fno-sanitize% --coverage -pedantic -Werror,$(flags))
+c_flags = -Wall -Wextra -fPIC $(filter -fno-semantic-interposition -O% -g -march=% -flto% -fsanitize% -fno-sanitize% --coverage -pedantic -Werror,$(flags))
 wrapped := -Wl,--wrap=malloc,--wrap=realloc
 hints = $(if $(HINTS),$(wrapped))
 
@@ -58,10 +58,11 @@ vpath %.c src/base
 modules := $(filter-out main library library_events library_files %_without_hdf5,$(notdir $(sources:.f90=))) build_info
 objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(filter-out %/program_heap.c,$(wildcard src/base/*.c)))
 objects_in = $(patsubst %.f90,$(BUILD)/%.o,$(notdir $(wildcard $(1:%=src/%/*.f90))))
-# The modules of the event loop. Those of its folders that it calls seldom or never are compiled like the others.
-seldom := changes clusters collapses stop_rules observables sample_values packing obstacle_cells time_stepped verlet_list recycling
-hot_objects := $(filter-out $(seldom:%=$(BUILD)/%.o),$(call objects_in,dynamics parallel physics search geometry)) \
-  $(patsubst %,$(BUILD)/%.o,random_stream sorting memory_hints memory_hints_c)
+# The modules of the event loop and of random insertion, which are optimised as a whole. Those of its folders that it calls seldom or
+# never are compiled like the others.
+seldom := motions changes clusters collapses stop_rules observables sample_values obstacle_cells time_stepped verlet_list recycle drives
+hot_objects := $(filter-out $(seldom:%=$(BUILD)/%.o),$(call objects_in,dynamics parallel drives sides physics search geometry)) \
+  $(patsubst %,$(BUILD)/%.o,random_insertion random_stream sorting memory_hints memory_hints_c)
 cold_objects := $(call objects_in,. input variables output files)
 
 # Unit tests: the same .pf files under pFUnit or the substitute, each in its own folder, with all checks on.
@@ -84,7 +85,7 @@ shared_objects := $(shared:tests/support/%.f90=$(T)/%.o)
 .DEFAULT_GOAL := all
 targets := all library wheel demo film lab notebook figures test unit-tests check bench bench-check bench-lab sanitize lint coverage docs install \
   uninstall dist set-up clean distclean help
-.PHONY: $(targets) FORCE
+.PHONY: $(targets) demo-crater demo-gas FORCE
 
 # --- What is built, by a `make` whose goals are files in $(BUILD) ---------------------------------------------
 ifneq ($(filter $(BUILD)/%,$(MAKECMDGOALS)),)
@@ -94,7 +95,7 @@ $(shell mkdir -p $(T))
 # The compilations of a build from the beginning are counted. Of a later one it is not known how many there will be.
 goals = $(filter $(1:%=$(BUILD)/%),$(MAKECMDGOALS))
 counted = $(objects) $(if $(call goals,ricochet),main program_heap) $(if $(call goals,%.so),library library_events library_files \
-  $(filter %_without_hdf5.o,$(without_hdf5))) $(if $(call goals,unit_tests),$(test_objects) $(shared_objects))
+  $(filter %_without_hdf5.o,$(without_hdf5))) $(if $(call goals,unit_tests),$(test_objects) $(shared_objects)) $(call goals,%.o)
 total := $(if $(V)$(wildcard $(BUILD)/kinds.o),,$(words $(counted)))
 $(shell : > $(BUILD)/progress)
 say = . src/progress.sh; count $(BUILD)/progress '$(total)'
@@ -211,11 +212,13 @@ jobs = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 build = mkdir -p $(BUILD) 2>/dev/null && [ -w $(BUILD) ] || { echo 'Cannot write to $(BUILD); BUILD=folder takes another' >&2; exit 2; }; \
   $(if $(shell command -v flock),flock $(BUILD)/lock) $(MAKE)
 
+libraries = $(addprefix $(BUILD)/,libricochet.so libricochet_files.so ricochet.h)
+# Both in one `make`, if both are asked for: a second one that waited for the lock would take a core from the first.
 all:  ## builds the program (default); library: for C, Python; wheel
-	@+$(build) $(BUILD)/ricochet
+	@+$(build) $(BUILD)/ricochet $(if $(filter library,$(MAKECMDGOALS)),$(libraries))
 
-library:
-	@+$(build) $(BUILD)/libricochet.so $(BUILD)/libricochet_files.so $(BUILD)/ricochet.h
+library: $(filter all,$(MAKECMDGOALS))
+	@+$(if $<,:,$(build) $(libraries))
 
 # build/wheels/*.whl: all of it with its libraries inside, for pip on machines without a compiler. For any processor
 # since 2013 or so, but for GLIBC as old as here: its name says which.
@@ -230,7 +233,8 @@ unit-tests:  ## unit tests; DEBUG=1 tests=tests/unit/test_X.pf: of a module
 	@$(foreach test,$(filter-out $(wildcard $(tests)),$(tests)),$(error $(test): is no file with unit tests; they are in $(suites)/test_*.pf))
 	@$(if $(PFUNIT_DIR),$(or $(if $(pfunit_mk),:),$(error PFUNIT_DIR=$(PFUNIT_DIR): no pFUnit is installed there (include/PFUNIT.mk is missing))),:)
 	@+$(build) $(BUILD)/unit_tests
-	@tests/support/run_unit_tests.sh "$(if $(PFUNIT_DIR),pFUnit $(PFUNIT_VERSION),the substitute for pFUnit)" \
+	@LIMIT=$${LIMIT:-$(if $(filter -O0,$(OPT)),900,300)} tests/support/run_unit_tests.sh \
+	  "$(if $(PFUNIT_DIR),pFUnit $(PFUNIT_VERSION),the substitute for pFUnit)" \
 	  $(BUILD)/unit_tests $$(sed 's,.*(\(.*\)_suite),$(suites)/\1.pf,' $(T)/tests.inc)
 
 # Shows a command while it runs.
@@ -238,21 +242,26 @@ shown = @$(announce) '$(strip $1)' $1
 demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	@echo 'make demo, step 1 of 3: packages (half a minute the first time)'
 	@.ci/set-up demo
-	@echo 'make demo, step 2 of 3: program and library (25 s on two idle cores the first time)'
+	@echo 'make demo, step 2 of 3: program and library (20 s on two idle cores the first time)'
 	@$(MAKE) $(jobs) all library
-	@echo 'make demo, step 3 of 3: two simulations and five pictures (10 s)'
-	$(call shown,$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002 --set output.event_log=.true.)
-	$(call shown,$(BUILD)/ricochet input/gas.nml -o runs/demo/gas.h5 --force)
-	$(call shown,$(BUILD)/ricochet input/gas.nml -o runs/demo/gas_start.h5 --force --set stop.collisions_per_disk=8 \
-	  --set output.frames_every_time=0.002 --set output.event_log=.true.)
-	$(call shown,$(venv) post/crater.py runs/demo/crater.h5 -o runs/demo/crater.png)
-	$(call shown,$(venv) post/player.py runs/demo/crater.h5 -o runs/demo/crater.html --colour displacement)
-	$(call shown,$(venv) post/speeds.py runs/demo/gas.h5 -o runs/demo/speeds.png)
-	$(call shown,$(venv) post/snapshot.py runs/demo/gas.h5 -o runs/demo/gas.png)
-	$(call shown,$(venv) post/player.py runs/demo/gas_start.h5 -o runs/demo/gas.html)
+	@echo 'make demo, step 3 of 3: three simulations and five pictures (5 s)'
+	@$(MAKE) $(jobs) demo-crater demo-gas
 	@echo 'In runs/demo: crater.html and gas.html, films for the browser; crater.png, speeds.png, gas.png; the data (*.h5).'
 	@echo 'Next: open runs/demo/crater.html in a browser; make lab (a page with moving disks and sliders);'
 	@echo '      a run of your own, as the README shows.'
+
+demo-crater:
+	$(call shown,$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002 --set output.event_log=.true.)
+	$(call shown,$(venv) post/crater.py runs/demo/crater.h5 -o runs/demo/crater.png)
+	$(call shown,$(venv) post/player.py runs/demo/crater.h5 -o runs/demo/crater.html --colour displacement)
+
+demo-gas:
+	$(call shown,$(BUILD)/ricochet input/gas.nml -o runs/demo/gas.h5 --force)
+	$(call shown,$(BUILD)/ricochet input/gas.nml -o runs/demo/gas_start.h5 --force --set stop.collisions_per_disk=8 \
+	  --set output.frames_every_time=0.002 --set output.event_log=.true.)
+	$(call shown,$(venv) post/speeds.py runs/demo/gas.h5 -o runs/demo/speeds.png)
+	$(call shown,$(venv) post/snapshot.py runs/demo/gas.h5 -o runs/demo/gas.png)
+	$(call shown,$(venv) post/player.py runs/demo/gas_start.h5 -o runs/demo/gas.html)
 
 FILM ?= runs/film
 film: name = $(FILM)/$(basename $(notdir $(INPUT)))
@@ -277,8 +286,9 @@ figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@runs/figures.sh
 
 # The unit tests take one core; meanwhile the others build the program and the library. The tests use the library with run-time checks.
-under_test = RICOCHET="$$(realpath '$(BUILD)')/ricochet" RICOCHET_LIBRARY="$$(realpath '$(BUILD)')/tests"
-test:  ## sets up, then unit tests and whole runs (ten minutes)
+# Hundreds of Python processes start, and would compile all modules anew without their files of bytecode.
+under_test = PYTHONDONTWRITEBYTECODE= RICOCHET="$$(realpath '$(BUILD)')/ricochet" RICOCHET_LIBRARY="$$(realpath '$(BUILD)')/tests"
+test:  ## sets up, then unit tests and whole runs (5 to 10 min)
 	@.ci/set-up demo test
 	@$(MAKE) $(jobs) $(unit_build) $(BUILD)/tests/unit_tests $(BUILD)/tests/four_disks
 	@$(MAKE) $(jobs) checked checked-library all

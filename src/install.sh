@@ -29,7 +29,7 @@ plan() {
     [$shared/post/requirements.txt]=requirements.txt)
   for text in LICENSE README.md CHANGELOG.md CITATION.cff docs/*.{md,png} docs/*/*.{md,png,ipynb} docs/reference/input/*.md; do behind[$documents/$text]=$text; done
   behind[$documents/input]="-> ../../ricochet/input" # pages lead there
-  for text in runs/ensemble{,_folder}.sh input/*.* input/pictures/* post/*.* post/ricochet/{,*/}*.* post/page/*.*; do behind[$shared/$text]=$text; done
+  for text in runs/ensemble{,_folder}.sh input/*.* input/pictures/* post/*.* post/ricochet/{,*/,*/*/}*.* post/page/*.*; do behind[$shared/$text]=$text; done
   for text in libricochet.so libricochet_files.so; do
     [[ -e $build/$text ]] || continue # made by make library
     behind[$package/lib/$text]=$build/$text
@@ -49,7 +49,7 @@ give_up() { echo "$action: $*" >&2; exit 2; }
 put() {
   local mode=644
   [[ ! -x $1 ]] || mode=755
-  mkdir -p "$root/${2%/*}"
+  [[ -d $root/${2%/*} ]] || mkdir -p "$root/${2%/*}"
   if [[ $1 == '-> '* ]]; then ln -sfn "${1#-> }" "$root/$2"; else install -T -m $mode "$1" "$root/$2"; fi
 }
 

@@ -1,39 +1,38 @@
-!> The C interface for other programs. The header file `ricochet.h` describes each function of the C interface. A handle represents
-!> an open simulation. The functions print nothing, do not end the process, and share no data between handles.
+!> The C interface, documented in the header `ricochet.h`. A handle represents an open simulation. The functions print nothing,
+!> never end the process, and share no data between handles.
 module library
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, &
     c_null_char, c_null_ptr, c_ptr
-  use box_sides, only: bounds
-  use changes, only: change_system, change_velocities
+  use changes, only: change_system, change_velocities, text_of_change
   use errors, only: error_t, exit_usage, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use initial_state, only: check_speeds
-  use input_groups, only: group_t, most_written, same_value, same_values
+  use input_groups, only: group_t, most_written, same_value
   use input_problems, only: problem_list_t
   use kinds, only: int32, int64, never, real64
+  use sample_numbers, only: sample_t
   use sample_values, only: frame_column_t, frame_columns, frame_sample
   use observables, only: observable_list_t, observed
-  use namelist_input, only: read_groups
-  use partners, only: side_name
-  use run_setup, only: choose_evolution, input_from_text, new_simulation, resolve_input, start_threads
+  use run_input, only: changed_input, changes_nothing, fixed_variable, fold_changes, input_from_text, plan_changes
+  use run_setup, only: choose_evolution, new_simulation, start_threads
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use stop_rules, only: coldness, stop_rule_t
   use system, only: seconds
   use team, only: make_team
-  use texts, only: eol, growing_text_t, lines_of, lower_case, place_of, text_t, written, written_exactly
+  use texts, only: eol, growing_text_t, lines_of, text_t, written, written_exactly
   use timeline, only: adapted_iterations, advance_once, collapse_note, report_rest
-  use variable_help, only: input_of
-  use variables, only: change_of, in_motion, obstacle_groups, row_of, table, words_of
+  use variable_help, only: input_of, quoted
+  use variables, only: change_of, in_motion, obstacle_groups, row_of
   implicit none
   private
   public :: advance_to, answer, begin, check_files, goal_of, renew_changed, session_of, session_t, text_of
 
   integer(c_int), parameter :: going_on = 1          !! result of `advance` if the simulation has not yet reached a limit
-  integer, parameter :: least_logged = 1000000  !! number of the most recent events that are kept when a full event log is shortened
+  integer, parameter :: least_logged = 1000000  !! number of the most recent events kept when a full event log is shortened
 
   type :: session_t
     type(run_input_t) :: input
@@ -42,7 +41,7 @@ module library
     type(stop_rule_t) :: rule
     integer(int64) :: iterations = 1                  !! number of iterations of the loop between two readings of the clock
     logical :: logged = .false.                       !! .true. if events are logged
-    type(event_log_t) :: log                          !! the latest events; the oldest events are deleted when the log is too long
+    type(event_log_t) :: log                          !! the latest events; when the log is too long, the oldest ones are deleted
   end type session_t
 
 contains
@@ -67,11 +66,10 @@ contains
     code = answer(error, message, room)
   end function open_simulation
 
-  !> Starts the engine of a new simulation and returns the handle of the simulation. If an error occurs, the simulation is
-  !> deallocated.
+  !> Starts the engine of a new simulation and returns its handle. If an error occurs, the simulation is deallocated.
   function begin(session, threads, error) result(handle)
     type(session_t), pointer, intent(inout) :: session
-    !> Number of threads; 0 for the number in the input, or for one thread if the input contains no number.
+    !> Number of threads; 0 for the number in the input, or for one if the input contains none
     integer(c_int), intent(in) :: threads
     type(error_t), allocatable, intent(in) :: error
     type(c_ptr) :: handle
@@ -123,8 +121,7 @@ contains
     if (allocated(error) .or. code /= going_on) code = answer(error, message, room)
   end function advance
 
-  !> Converts the arguments of `advance` to a stop rule. If none of the arguments sets a limit, the result is the stop rule of the
-  !> input.
+  !> Converts the arguments of `advance` to a stop rule. Without any limit, the result is the stop rule of the input.
   pure function goal_of(session, time, collisions, events) result(rule)
     type(session_t), intent(in) :: session
     real(real64), intent(in) :: time                  !! time since the start of the run [time]
@@ -137,8 +134,7 @@ contains
     if (time >= never) rule%limits%time = never
   end function goal_of
 
-  !> Advances a simulation until a stop rule is met, or until `patience` seconds have passed. If the stop rule has not been met,
-  !> `code` is `going_on`.
+  !> Advances a simulation until a stop rule is met, or until `patience` seconds have passed; `code` is then `going_on`.
   subroutine advance_to(session, rule, patience, code, error)
     type(session_t), intent(inout) :: session
     type(stop_rule_t), intent(in) :: rule
@@ -172,9 +168,62 @@ contains
     code = 0
   end subroutine advance_to
 
-  !> See ricochet.h. The changed input replaces the stored input; later changes and saved files are based on the changed input.
+  !> See ricochet.h. The changed input replaces the stored one, on which later changes and saved files are based.
   function change(handle, overrides, message, room) bind(C, name="ricochet_change") result(code)
     type(c_ptr), value :: handle
+    character(kind=c_char), intent(in) :: overrides(*)
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_int), value :: room
+    integer(c_int) :: code
+    type(session_t), pointer :: session
+    type(run_input_t) :: before, input
+    type(simulation_t) :: changed
+    type(error_t), allocatable :: error
+    type(text_t), allocatable :: lines(:)
+    type(problem_list_t) :: problems
+    character(len=:), allocatable :: problem
+    integer :: k
+
+    session => session_of(handle)
+    call lines_of(text_of(overrides), lines)
+    do k = 1, size(lines)
+      if (fixed_variable(lines(k)%text) /= "" .and. .not. allocated(error)) &
+        call fail(error, exit_usage, fixed_variable(lines(k)%text)//": cannot change in a running simulation")
+    end do
+    if (.not. allocated(error)) call input_in_force(session, before, error)
+    if (.not. allocated(error)) then
+      call changed_input(before, lines, session%sim%box, session%sim%now, input, problems, stepped=.true.)
+      if (problems%count == 0) call plan_changes(input, problems, stepped=.true.)
+      call problems%report(before%path, error, lines)
+    end if
+    if (.not. allocated(error)) call check_files(before%groups, input%groups, error)
+    if (.not. allocated(error)) then
+      code = 0
+      if (changes_nothing(before, input, stepped=.true.)) return
+      changed = session%sim
+      call change_system(changed, input%settings%system_t, problem)
+      if (problem /= "") call fail(error, exit_usage, problem)
+    end if
+    if (.not. allocated(error)) call check_motion(changed, input%path, error)
+    if (.not. allocated(error)) then
+      input%text = input_of(input%groups)
+      input%overrides = lines(:0)
+      input%changes = changes_of(session)
+      do k = 1, size(lines)
+        input%changes = input%changes//written_exactly(session%sim%time())//" "//lines(k)%text//eol
+      end do
+      input%settings%run%threads = session%input%settings%run%threads
+      session%input = input
+      call take_schedule(input, changed)
+      call renew(session, changed)
+    end if
+    code = answer(error, message, room)
+  end function change
+
+  !> See ricochet.h. The change is added to the text of the input, as a group `&change`.
+  function schedule(handle, time, overrides, message, room) bind(C, name="ricochet_schedule") result(code)
+    type(c_ptr), value :: handle
+    real(c_double), value :: time
     character(kind=c_char), intent(in) :: overrides(*)
     character(kind=c_char), intent(inout) :: message(*)
     integer(c_int), value :: room
@@ -184,89 +233,58 @@ contains
     type(simulation_t) :: changed
     type(error_t), allocatable :: error
     type(text_t), allocatable :: lines(:)
-    type(problem_list_t) :: problems
-    character(len=:), allocatable :: problem, list
-    logical :: complete
+    character(len=:), allocatable :: text
     integer :: k
 
     session => session_of(handle)
     call lines_of(text_of(overrides), lines)
-    list = changes_of(session)
+    text = session%input%text//eol//"&change time = "//written_exactly(time)//" set ="
     do k = 1, size(lines)
-      if (.not. allocated(error)) call check_changeable(lines(k)%text, error)
-      list = list//written_exactly(session%sim%time())//" "//lines(k)%text//eol
+      text = text//" "//quoted(lines(k)%text)
     end do
-    if (.not. allocated(error)) then
-      input%path = session%input%path
-      input%overrides = lines
-      call read_groups(input_of(session%input%groups), lines, input%groups, problems, complete)
-      call drop_former_motion(session%input%groups, input%groups)
-      call keep_sides(session, input%groups)
-      call resolve_input(input, complete, problems, error, stepped=.true.)
-    end if
+    if (.not. time < never .or. session%sim%has_reached(time)) call fail(error, exit_usage, "time: "//written(time) &
+      //" is not a time after the present time, "//written(session%sim%time()))
+    if (.not. allocated(error)) call input_from_text(text//"/"//eol, session%input%path, session%input%overrides, input, error, &
+      stepped=.true.)
     if (.not. allocated(error)) call check_files(session%input%groups, input%groups, error)
     if (.not. allocated(error)) then
-      code = 0
-      if (changes_nothing(session, input)) return
-      changed = session%sim
-      call change_system(changed, input%settings%system_t, problem)
-      if (problem /= "") call fail(error, exit_usage, problem)
-    end if
-    if (.not. allocated(error)) call check_motion(changed, input%path, error)
-    if (.not. allocated(error)) then
-      input%text = input_of(input%groups)
-      input%overrides = lines(:0)
-      input%changes = list
+      input%changes = session%input%changes
       input%settings%run%threads = session%input%settings%run%threads
       session%input = input
+      changed = session%sim
+      changed%features = input%settings%features
+      call changed%fit_series()
+      call changed%open_up()
+      changed%schedule = input%settings%schedule
       call renew(session, changed)
     end if
     code = answer(error, message, room)
-  end function change
+  end function schedule
 
-  !> Reports a variable that may not change in a running simulation. An unknown variable is not reported, because `read_groups`
-  !> reports it.
-  subroutine check_changeable(line, error)
-    character(len=*), intent(in) :: line              !! change in the form GROUP.VARIABLE=VALUE
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: name
-
-    name = lower_case(trim(adjustl(line(:index(line, "=") - 1))))
-    name = name(:index(name//"(", "(") - 1)           ! without the index of an element, as in box.gravity(2)
-    if (row_of(name(:index(name, ".") - 1), name(index(name, ".", back=.true.) + 1:)) == 0) return
-    if (change_of(name) /= in_motion) &
-      call fail(error, exit_usage, line(:index(line, "=") - 1)//": cannot change in a running simulation")
-  end subroutine check_changeable
-
-  !> Whether a changed input has the same values as the present input. A side without a group in the present input has the default
-  !> values.
-  function changes_nothing(session, input) result(yes)
+  !> The input that describes the system at the present time: in contrast to `session%input`, it includes the scheduled changes
+  !> already made.
+  subroutine input_in_force(session, input, error)
     type(session_t), intent(in) :: session
-    type(run_input_t), intent(in) :: input            !! changed input
-    logical :: yes, complete
-    type(run_input_t) :: present
-    type(problem_list_t) :: problems
-    type(error_t), allocatable :: error
-    integer :: g
+    type(run_input_t), intent(out) :: input
+    type(error_t), allocatable, intent(out) :: error
 
-    present%path = input%path
-    allocate (present%overrides(0))
-    do g = 1, size(input%groups)
-      associate (group => input%groups(g), now => session%input%groups)
-        if (any(now%name == group%name .and. now%instance == group%instance)) cycle
-        ! An override without a value creates the group of a side, with the default values.
-        present%overrides = [present%overrides, text_t("side."//trim(group%instance)//".motion=")]
-      end associate
-    end do
-    call read_groups(input_of(session%input%groups), present%overrides, present%groups, problems, complete)
-    call resolve_input(present, complete, problems, error, stepped=.true.)
-    yes = .not. allocated(error)
-    if (yes) yes = same_values(present%groups, input%groups)
-  end function changes_nothing
+    input = session%input
+    if (session%sim%changes_made > 0) call fold_changes(input, session%sim%changes_made, session%sim%box, error)
+  end subroutine input_in_force
 
-  !> Reports an obstacle file or a starting file that has changed since the simulation was created. The input is read again for each
-  !> change and each save. Without this report, a changed file would move obstacles in the running simulation, and the saved file
-  !> would describe other disks.
+  !> Replaces the schedule of a simulation by that of an input, none of whose changes has been made.
+  subroutine take_schedule(input, sim)
+    type(run_input_t), intent(in) :: input
+    type(simulation_t), intent(inout) :: sim
+
+    sim%changes_made = 0
+    if (allocated(sim%schedule)) deallocate (sim%schedule)
+    if (allocated(input%settings%schedule)) sim%schedule = input%settings%schedule
+  end subroutine take_schedule
+
+  !> Reports an obstacle or initial-configuration file that has changed since the simulation was created. The input is read again
+  !> for each change and each save: with a changed file, obstacles would jump in the running simulation, and the saved file would
+  !> describe other disks.
   subroutine check_files(groups, again, error)
     type(group_t), intent(in) :: groups(:)            !! groups of the input of the simulation
     type(group_t), intent(in) :: again(:)             !! groups of the same input, which has just been read
@@ -289,71 +307,6 @@ contains
     end do
   end subroutine check_files
 
-  !> Drops the variables of a side that have no effect with its new motion, such as the force on a piston that is now held. A
-  !> variable that the change itself sets is kept, so that it is reported.
-  subroutine drop_former_motion(before, groups)
-    type(group_t), intent(in) :: before(:)            !! groups of the present input
-    type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
-    integer :: g, v, old
-
-    do g = 1, size(groups)
-      old = findloc(before%name == "side" .and. before%instance == groups(g)%instance, .true., dim=1)
-      if (groups(g)%name /= "side" .or. old == 0) cycle
-      if (before(old)%text_of("motion") == groups(g)%text_of("motion")) cycle
-      do v = 1, size(groups(g)%values)
-        associate (slot => groups(g)%values(v), words => words_of(table(groups(g)%values(v)%row)%goes_with))
-          if (.not. any(words == "motion") .or. slot%line < 0) cycle    ! an override has a negative line number
-          slot%given = slot%given .and. any(words == groups(g)%text_of("motion"))
-        end associate
-      end do
-    end do
-  end subroutine drop_former_motion
-
-  !> Sets the positions of all sides whose motion changes, so that each side starts its new motion at its present position.
-  subroutine keep_sides(session, groups)
-    type(session_t), intent(in) :: session
-    type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
-    character(len=10), parameter :: of_motion(4) = [character(len=10) :: "motion", "velocity", "start_time", "end_time"]
-    ! Positions of the sides (axis, lower or upper) and of one side [length], time when a motion starts and its duration so far
-    ! [time]
-    real(real64) :: at(2, 2), x, start, passed
-    integer :: g, k, old, side, inwards
-    logical :: same
-
-    call bounds(session%sim%box, session%sim%now, at(:, 1), at(:, 2))
-    do g = 1, size(groups)
-      side = place_of(trim(groups(g)%instance), side_name)
-      if (groups(g)%name /= "side" .or. side == 0) cycle
-      associate (group => groups(g), before => session%input%groups, box => session%sim%box, &
-        position => groups(g)%values(row_of("side", "position")))
-        old = findloc(before%name == "side" .and. before%instance == group%instance, .true., dim=1)
-        same = old > 0
-        do k = 1, size(of_motion)
-          if (.not. same) exit
-          associate (new => group%values(row_of("side", trim(of_motion(k)))), &
-            then => before(old)%values(row_of("side", trim(of_motion(k)))))
-            same = .not. (new%given .or. then%given) .or. same_value(new, then)
-          end associate
-        end do
-        if (same) cycle
-        inwards = 2*modulo(side, 2) - 1               ! sign of the inward normal along the axis
-        x = at((side + 1)/2, merge(1, 2, inwards > 0))
-        position%given = any(group%text_of("motion") == [character(len=17) :: "still", "constant_velocity", "piston"])
-        call position%clear()
-        if (.not. position%given) cycle
-        if (group%text_of("motion") == "constant_velocity") then
-          start = group%real_of("start_time", 0.0_real64)
-          passed = min(max(session%sim%time(), start), group%real_of("end_time", start)) - start
-          x = x - inwards*group%real_of("velocity", 0.0_real64)*passed
-        end if
-        position%reals = [x]
-        if (inwards > 0) position%given = abs(x - box%lower((side + 1)/2)) > 0
-        if (inwards < 0) position%given = abs(x - box%upper((side + 1)/2)) > 0
-        if (.not. position%given) call position%clear()
-      end associate
-    end do
-  end subroutine keep_sides
-
   !> See ricochet.h.
   function give_velocities(handle, values, message, room) bind(C, name="ricochet_set_velocities") result(code)
     type(c_ptr), value :: handle
@@ -369,17 +322,20 @@ contains
 
     session => session_of(handle)
     changed = session%sim
-    if (.not. all(ieee_is_finite(values(:2*changed%n_disks())))) then
+    v = reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())])
+    do i = 1, changed%n_disks()                       ! the velocities of waiting disks have no effect
+      if (.not. changed%is_inside(i)) v(:, changed%tag(i)%id) = changed%velocity(i)
+    end do
+    if (.not. all(ieee_is_finite(v))) then
       call fail(error, exit_usage, "velocity: some values are NaN or infinite")
       code = answer(error, message, room)
       return
     end if
-    v = reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())])
     code = 0
     if (all([(abs(v(:, changed%tag(i)%id) - changed%velocity(i)) <= 0, i=1, changed%n_disks())])) return
     call change_velocities(changed, v)
     call check_motion(changed, session%input%path, error)
-    if (.not. allocated(error)) call renew_changed(session, changed, "velocity")
+    if (.not. allocated(error)) call renew_changed(session, changed, "velocity", error)
     code = answer(error, message, room)
   end function give_velocities
 
@@ -387,9 +343,13 @@ contains
   function changes_of(session) result(list)
     type(session_t), intent(in) :: session
     character(len=:), allocatable :: list
+    integer :: k
 
     list = ""
     if (allocated(session%input%changes)) list = session%input%changes
+    do k = 1, int(session%sim%changes_made)
+      list = list//text_of_change(session%sim%schedule(k))
+    end do
   end function changes_of
 
   !> Reports speeds and energies that are out of range after a change.
@@ -404,12 +364,18 @@ contains
   end subroutine check_motion
 
   !> Replaces the state of the simulation by a changed state, and adds the change to the list of changes.
-  subroutine renew_changed(session, sim, what)
+  subroutine renew_changed(session, sim, what, error)
     type(session_t), intent(inout) :: session
-    type(simulation_t), intent(in) :: sim
+    type(simulation_t), intent(inout) :: sim
     character(len=*), intent(in) :: what              !! name of the quantity that was changed
+    type(error_t), allocatable, intent(out) :: error
+    type(run_input_t) :: input
 
-    session%input%changes = changes_of(session)//written_exactly(sim%time())//" "//what//eol
+    call input_in_force(session, input, error)
+    if (allocated(error)) return
+    input%changes = changes_of(session)//written_exactly(sim%time())//" "//what//eol
+    session%input = input
+    call take_schedule(input, sim)
     call renew(session, sim)
   end subroutine renew_changed
 
@@ -451,7 +417,7 @@ contains
     real(c_double), intent(inout) :: values(*)
     integer(c_int) :: width
     type(session_t), pointer :: session
-    real(real64), allocatable :: sample(:, :)
+    type(sample_t) :: sample
     type(frame_column_t), allocatable :: list(:)
     integer :: n
 
@@ -476,7 +442,12 @@ contains
       if (size(list) == 0) return
       width = list(1)%width
       sample = frame_sample(sim, 0_int64, list)
-      values(:width*n) = sample(3:, 1)                ! the first two numbers of a sample are step and time
+      ! The first integer of a sample is the step, and the first real is the time.
+      if (list(1)%is_count) then
+        values(:width*n) = real(sample%integers(2:, 1), real64)
+      else
+        values(:width*n) = sample%reals(2:, 1)
+      end if
     end associate
   end function copy_column
 
@@ -514,36 +485,52 @@ contains
     integer(c_int), value :: room
     integer(c_int) :: length
     type(session_t), pointer :: session
-    type(growing_text_t) :: growing
+    type(run_input_t) :: input
+    type(error_t), allocatable :: error
     character(len=:), allocatable :: words
-    integer :: g, k, most
 
     session => session_of(handle)
-    associate (groups => session%input%groups)
-      select case (text_of(what))
-      case ("input")
-        call growing%add(input_of(groups))
-      case ("parameters")
-        do g = 1, size(groups)
-          do k = 1, size(groups(g)%values)
-            if (.not. groups(g)%values(k)%is_set()) cycle
-            most = most_written
-            ! Obstacles are written with all their values, because some obstacles were read from a file.
-            if (any(obstacle_groups == groups(g)%name)) most = huge(most)
-            call growing%add(groups(g)%value_line(k, most)//eol)
-          end do
-        end do
-      case ("changes")
-        call growing%add(changes_of(session))
-      case default
-        call growing%add(collapse_note(session%sim))
-        if (session%rule%too_cold(session%sim)) call growing%add(trim(merge("; ", "  ", growing%text() /= ""))//coldness)
-      end select
-    end associate
-    words = growing%text()
+    if (session%sim%changes_made > 0 .and. any(text_of(what) == ["input     ", "parameters"])) &
+      call input_in_force(session, input, error)
+    if (allocated(input%groups)) then
+      words = described(session, input%groups, text_of(what))
+    else
+      words = described(session, session%input%groups, text_of(what))
+    end if
     length = len(words)
     if (room > length) call give(words, text, room)
   end function copy_text
+
+  !> Text that describes the simulation, as in ricochet.h.
+  function described(session, groups, what) result(text)
+    type(session_t), intent(in) :: session
+    type(group_t), intent(in) :: groups(:)            !! groups of the input that describes the system at the present time
+    character(len=*), intent(in) :: what
+    character(len=:), allocatable :: text
+    type(growing_text_t) :: growing
+    integer :: g, k, most
+
+    select case (what)
+    case ("input", "saved input")
+      call growing%add(input_of(groups))
+    case ("parameters")
+      do g = 1, size(groups)
+        do k = 1, size(groups(g)%values)
+          if (.not. groups(g)%values(k)%is_set()) cycle
+          most = most_written
+          ! Obstacles are written with all their values, because obstacles read from a file have no other description.
+          if (any(obstacle_groups == groups(g)%name)) most = huge(most)
+          call growing%add(groups(g)%value_line(k, most)//eol)
+        end do
+      end do
+    case ("changes")
+      call growing%add(changes_of(session))
+    case default
+      call growing%add(collapse_note(session%sim))
+      if (session%rule%too_cold(session%sim)) call growing%add(trim(merge("; ", "  ", growing%text() /= ""))//coldness)
+    end select
+    text = growing%text()
+  end function described
 
   !> Returns the simulation that belongs to a handle.
   function session_of(handle) result(session)
@@ -553,7 +540,7 @@ contains
     call c_f_pointer(handle, session)
   end function session_of
 
-  !> Copies the message of an error into a C buffer and returns the exit code of the error, or 0 if no error occurred.
+  !> Copies the message of an error into a C buffer and returns its exit code, or 0 if there is no error.
   function answer(error, message, room) result(code)
     type(error_t), allocatable, intent(in) :: error
     character(kind=c_char), intent(inout) :: message(*)
@@ -567,7 +554,7 @@ contains
     call give(error%message, message, room)
   end function answer
 
-  !> Copies a text into a C buffer. If the buffer is too short, the text is truncated.
+  !> Copies a string into a C buffer, truncating it if the buffer is too short.
   subroutine give(text, buffer, room)
     character(len=*), intent(in) :: text
     character(kind=c_char), intent(inout) :: buffer(*)
@@ -581,7 +568,7 @@ contains
     buffer(min(len(text), room - 1) + 1) = c_null_char
   end subroutine give
 
-  !> Converts a C string to a Fortran text.
+  !> Converts a C string to a Fortran string.
   function text_of(bytes) result(text)
     character(kind=c_char), intent(in) :: bytes(*)
     character(len=:), allocatable :: text

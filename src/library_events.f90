@@ -1,21 +1,20 @@
-!> Functions of the C interface `ricochet.h` that concern single events, copies of simulations, and positions of disks.
+!> Functions of the C interface `ricochet.h` for single events, copies of simulations, and positions of disks.
 module library_events
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_ptr
   use changes, only: change_positions
   use errors, only: error_t, exit_usage, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
-  use kinds, only: int32, int64, real64
+  use kinds, only: int32, int64, never, real64
   use library, only: advance_to, answer, begin, goal_of, renew_changed, session_of, session_t
   use moved_disks, only: check_positions
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use timeline, only: advance_once
+  use timeline, only: advance_once, next_action
   implicit none
   private
 
-  !> Number of events and kicks after which `next_events` ends its search for future events. For n requested events the limit is
-  !> larger by 100 n.
+  !> Number of events and kicks after which `next_events` abandons its search; 100 n more for n requested events.
   integer(int64), parameter :: longest_look = 2000000
 
 contains
@@ -39,7 +38,7 @@ contains
     code = answer(error, message, room)
   end function copy
 
-  !> See ricochet.h. The event log is emptied before the advance, unless the input requests an event log.
+  !> See ricochet.h. Before the advance, the event log is emptied, unless the input requests an event log.
   function advance_event(handle, time, collisions, events, patience, message, room) bind(C, name="ricochet_advance_event") &
     result(code)
     type(c_ptr), value :: handle
@@ -75,8 +74,8 @@ contains
     if (n > 0) records(:, :n) = session%log%record(:, session%log%n - n + 1:session%log%n)
   end function last_events
 
-  !> See ricochet.h. The function advances a copy of the simulation. A prediction from the present velocities would not be
-  !> sufficient, because other collisions or kicks may change the velocities before the predicted event.
+  !> See ricochet.h. A copy of the simulation is advanced: predictions from the present velocities would be wrong if other
+  !> collisions or kicks changed them first.
   function next_events(handle, most, records) bind(C, name="ricochet_next_events") result(n)
     type(c_ptr), value :: handle
     integer(c_int), value :: most
@@ -101,7 +100,7 @@ contains
     do while (log%n < most .and. looked < longest_look + 100_int64*most)
       limits%iterations = 1000
       call advance_once(evolution, ahead, limits, error, log)
-      if (allocated(error) .or. evolution%idle) exit
+      if (allocated(error) .or. (evolution%idle .and. .not. next_action(evolution, ahead) < never)) exit
       looked = looked + max(limits%iterations - evolution%iterations_left, int(ahead%n_disks(), int64))
     end do
     n = min(log%n, log%most)
@@ -119,10 +118,14 @@ contains
     type(simulation_t) :: changed
     type(error_t), allocatable :: error
     real(real64), allocatable :: x(:, :)              ! (2,n) [length]
+    integer(int32) :: i
 
     session => session_of(handle)
     changed = session%sim
     x = reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())])
+    do i = 1, changed%n_disks()                       ! the positions of waiting disks have no effect
+      if (.not. changed%is_inside(i)) x(:, changed%tag(i)%id) = changed%disk(i)%x
+    end do
     if (changed%box%is_sheared()) then
       call fail(error, exit_usage, "position: cannot be set in a sheared box")
     else if (.not. all(abs(x) < huge(1_int32))) then
@@ -131,7 +134,7 @@ contains
       call change_positions(changed, x)
       call check_positions(changed, error)
     end if
-    if (.not. allocated(error)) call renew_changed(session, changed, "position")
+    if (.not. allocated(error)) call renew_changed(session, changed, "position", error)
     code = answer(error, message, room)
   end function give_positions
 

@@ -1,4 +1,5 @@
-!> Functions that save simulations to files, and load simulations from the output files of runs. See `ricochet.h`.
+!> Functions that save simulations to files, and load them from the output files of runs (see
+!> `ricochet.h`).
 module library_files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_ptr
   use sampling_schedule, only: progress_t
@@ -9,7 +10,8 @@ module library_files
   use library, only: answer, begin, check_files, session_of, session_t, text_of
   use output, only: output_t
   use run_files, only: check_name, output_of, source_of
-  use run_setup, only: input_from_text, new_simulation
+  use run_input, only: input_from_text
+  use run_setup, only: new_simulation
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
@@ -38,7 +40,7 @@ contains
     if (.not. allocated(error)) call input_from_text(session%input%text, session%input%path, session%input%overrides, input, &
       error, stepped=.true.)
     if (.not. allocated(error)) call check_files(session%input%groups, input%groups, error)
-    if (session%sim%changes > 0) then                 ! the initial state is unknown, because the changed input does not describe it
+    if (allocated(session%input%changes)) then        ! the initial state is unknown, because the changed input does not describe it
       first = session%sim
       input%changes = session%input%changes
     else if (.not. allocated(error)) then

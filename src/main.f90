@@ -4,7 +4,7 @@ program main
   use command_line, only: answer, command_t, read_command_line
   use errors, only: error_t, exit_finished
   use run, only: perform_run
-  use run_setup, only: read_input
+  use run_input, only: read_input
   use settings, only: run_input_t
   use system, only: end_program, fill_standard_streams
   implicit none
@@ -12,8 +12,8 @@ program main
 
 contains
 
-  !> Handles an option such as --help that only prints information, or performs a run. The variables are declared in this procedure
-  !> and not in the main program, because variables of the main program would not be deallocated at its end.
+  !> Serves an option that only prints information, such as --help, or performs a run. The main
+  !> program has no variables of its own, because they would not be deallocated at its end.
   subroutine serve()
     type(command_t) :: command
     type(run_input_t) :: input

@@ -70,9 +70,10 @@ void ricochet_close(ricochet *);
 
 /* Advances a simulation until the first of three limits is reached: a time, a number of collisions of disks with disks, or a
    number of events, all counted from the start of the run. INFINITY and INT64_MAX stand for no limit. If no argument is a limit,
-   the stop rule of the input applies, if the input contains a stop rule. The two numbers are reached exactly, if necessary
-   between simultaneous events (except with time steps, which are always completed); the next call continues with the remaining
-   ones. The results do not depend on the number of calls with which a simulation is advanced.
+   the stop rule of the input applies, provided that the input contains one. A limit on collisions or events is reached exactly:
+   if several events are simultaneous, the simulation may stop between them, and the next call executes the remaining ones. Only
+   with time steps may the limit be exceeded, because a step is always completed. The results do not depend on the number of calls
+   with which a simulation is advanced.
    Returns 0 when a limit is reached, 1 if `patience` seconds have passed before a limit is reached (call the function again), or
    an exit code: 2 if `time` is NAN, other codes if the simulation cannot be continued. */
 int ricochet_advance(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
@@ -93,14 +94,14 @@ int ricochet_last_events(ricochet *, int most, double records[][6]);
 double ricochet_time(ricochet *);
 
 /* Stores three numbers: the number of disks, the number of collisions of disks with disks, and the number of events. Events are
-   collisions of disks with disks, sides and obstacles. */
+   collisions of disks with disks, sides and obstacles, and departures through open sides. */
 void ricochet_count(ricochet *, int64_t counts[3]);
 
 /* Copies one property of all disks.
-   name:    position, velocity, event_count, image, angular_velocity, orientation, radius, mass or species
+   name:    position, velocity, event_count, present, image, angular_velocity, orientation, radius, mass or species
    values:  array of WIDTH numbers for each disk
    Returns WIDTH: 2 for position, velocity and image, 1 for the other properties, or 0 if the disks do not have this
-   property. */
+   property. Positions and motions of disks outside of the box (present = 0) are NAN. */
 int ricochet_column(ricochet *, const char *name, double *values);
 
 /* Copies all observables at the present time.
@@ -111,24 +112,33 @@ int ricochet_column(ricochet *, const char *name, double *values);
 int ricochet_observables(ricochet *, char *names, int room, double *values);
 
 /* Changes forces, contact laws and motions at the present time.
-   overrides:  lines GROUP.VARIABLE=VALUE of box.gravity, drive, contact, side, wall and obstacle
+   overrides:  lines GROUP.VARIABLE=VALUE of box.gravity, drive, contact, side, source, wall and obstacle
    A side starts a new motion where it is. Variables of its former motion that the new motion does not have are dropped.
    The change of the total energy counts as work. Returns an exit code; if the code is not 0, nothing is changed. */
 int ricochet_change(ricochet *, const char *overrides, char *message, int room);
 
+/* Plans a change at a later time, with the same effect as a group &change of the input.
+   time:       time of the change, later than the present time
+   overrides:  as for ricochet_change
+   The functions that advance the simulation make the change after the collisions and before the kicks at this time. Returns an exit
+   code; if the code is not 0, the change is not planned. */
+int ricochet_schedule(ricochet *, double time, const char *overrides, char *message, int room);
+
 /* Sets the velocities of all disks at the present time.
-   velocities:  x and y component for each disk
+   velocities:  x and y component for each disk; those of disks outside of the box have no effect
    The change of the total energy counts as work. Returns an exit code; if the code is not 0, nothing is changed. */
 int ricochet_set_velocities(ricochet *, const double *velocities, char *message, int room);
 
 /* Sets the positions of all disks at the present time.
-   positions:  x and y for each disk
+   positions:  x and y for each disk; those of disks outside of the box have no effect
    If disks overlap each other, an obstacle or a side at these positions, or if the box is sheared, the result is an error. The
    change of the total energy counts as work. Returns an exit code; if the code is not 0, nothing is changed. */
 int ricochet_set_positions(ricochet *, const double *positions, char *message, int room);
 
 /* Copies a text that describes the simulation at the present time.
    what:  "input" for an input file that includes overrides and changes;
+          "saved input" for an input file with which the program continues a file that is saved now: scheduled changes
+          since the last call of a function that changes the simulation are groups &change;
           "parameters" for a line GROUP.VARIABLE = JSON for each variable that has a value;
           "changes" for a line TIME GROUP.VARIABLE=VALUE for each change;
           "note" for a note about inelastic collapses, or about disks that are too slow to continue (may be empty)

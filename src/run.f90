@@ -15,7 +15,8 @@ module run
   use partners, only: n_sides
   use progress_line, only: progress_line_t
   use run_files, only: is_file, source_of, unfinished
-  use run_setup, only: choose_evolution, new_simulation, read_input, start_threads
+  use run_input, only: read_input
+  use run_setup, only: choose_evolution, new_simulation, start_threads
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use stop_rules, only: coldness, stop_rule_t
@@ -29,7 +30,7 @@ module run
   public :: perform_run
 
   integer, parameter :: most_unwritten = 4096              !! capacity of the event log [events]
-  !> Size of an output above which the program prints the expected size at the start of the run. [bytes]
+  !> Size of an output above which the program prints the expected size when the run starts [bytes]
   integer(int64), parameter :: much = 250000000
 
   type :: run_t
@@ -44,14 +45,13 @@ module run
     real(real64) :: started = 0.0_real64                   !! time when the program started, by the clock `seconds` [s]
     real(real64) :: rate = 0.0_real64                      !! collisions per processor time in this part of the run [1/s]
     real(real64) :: event_rate = 0.0_real64                !! events per processor time in this part of the run [1/s]
-    !> Number of events that the serial engine executed in this part of a parallel run.
+    !> Number of events executed by the serial engine in this part of a parallel run.
     integer(int64) :: serial_events = 0
   end type run_t
 
 contains
 
-  !> Reads the input and performs the run. If the run was stopped by a signal or by the wall-clock limit, `error` contains the exit
-  !> status.
+  !> Reads the input and performs the run. If a signal or the wall-clock limit stopped the run, `error` contains the exit status.
   subroutine perform_run(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -94,8 +94,8 @@ contains
     call run%output%release()
   end subroutine perform_run
 
-  !> Creates the state of a new run and opens the output. With the option --check, the procedure only reports that the input is
-  !> valid.
+  !> Creates the state of a new run and opens the output. With --check, only reports that the input
+  !> is valid.
   subroutine begin(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -128,8 +128,8 @@ contains
     end associate
   end subroutine begin
 
-  !> Restores the state of a run and opens the output. With the option --check, the procedure only reports that the run can be
-  !> resumed.
+  !> Restores the state of a run and opens the output. With --check, only reports that the run can
+  !> be resumed.
   subroutine go_on(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -145,6 +145,9 @@ contains
       if (.not. allocated(error)) call read_checkpoint(command%output, run%input, sim, progress, finished, error)
       if (.not. (found .or. allocated(error))) &
         call fail(error, exit_files, command%output//": another run has just created it; repeat the command later")
+      ! The file already contains a checkpoint of the present state; writing it again would only delay the stop.
+      if (stop_requested() .and. .not. allocated(error)) &
+        call fail(error, exit_stopped, "stopped before the run continued; nothing is lost: repeat the command")
       if (allocated(error)) return
       rule = stop_rule_t(run%input%settings%stop, sim)
       if (finished .and. (rule%is_met(sim) .or. rule%rests(sim))) then
@@ -160,7 +163,7 @@ contains
     end associate
   end subroutine go_on
 
-  !> Prints warnings about settings that are valid but rarely useful.
+  !> Warns of settings that are valid but rarely useful.
   subroutine warn(run)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
@@ -192,8 +195,7 @@ contains
     deallocate (run%evolution)                             ! the completion of the output may need the memory
   end subroutine follow
 
-  !> Returns the wall time of this part of the run, its rate, and its number of serial events. These are the values of the argument
-  !> `cost` of `output: write_end`.
+  !> Wall time of this part of the run, its rate, and its number of serial events, as `output: write_end` expects them.
   function cost_of(run) result(cost)
     type(run_t), intent(in) :: run
     real(real64) :: cost(3)
@@ -219,8 +221,8 @@ contains
     call run%line%start(run%sim, run%stop_rule, run%started)
     limits%time = run%sim%time()
     call run%output%tighten(limits)
-    ! If no further event can occur, the run ends with a last sample. A resumed run that was stopped just after its last sample has
-    ! to call `advance_once` to detect that no further event can occur.
+    ! If no further event can occur, the run ends with a last sample. A run stopped just after this sample and then resumed must
+    ! call `advance_once` to detect its end.
     if (run%sim%events_done .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits
@@ -235,7 +237,8 @@ contains
       if (allocated(error)) exit
       now = seconds()
       stopping = stop_requested()
-      ! Each part of a run advances the simulation at least once, even if the wall-clock limit is very short.
+      ! Each part of a run advances the simulation at least once, however short the wall-clock
+      ! limit.
       if (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock) stopping = .true.
       requests = checkpoint_requests()
       if (stopping .or. requests > requests_served .or. now > next_checkpoint) then
@@ -254,7 +257,7 @@ contains
     call run%line%clear()
   end subroutine main_loop
 
-  !> The results of the run as lines of the form `key = value`.
+  !> Results of the run, as lines of the form `key = value`.
   function summary(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
@@ -263,7 +266,9 @@ contains
     associate (sim => run%sim)
       energy = energies(sim)
       text = "output = "//legible(run%command%output)// &
-        eol//"disks = "//written(int(sim%n_disks()))// &
+        eol//"disks = "//written(int(sim%n_disks()))
+      if (allocated(sim%waits)) text = text//eol//"disks_inside = "//written(int(sim%n_inside()))
+      text = text// &
         eol//"collisions = "//written(sim%tally%collisions)// &
         eol//"side_collisions = "//written(sum(sim%tally%surface_collisions(:n_sides)))// &
         eol//"obstacle_collisions = "//written(sum(sim%tally%surface_collisions(n_sides + 1:)))// &
@@ -274,21 +279,20 @@ contains
         eol//"dissipated_energy = "//written(sim%tally%total(dissipated))// &
         eol//"wall_time = "//written(seconds() - run%started)// &
         eol//"collisions_per_second = "//written(run%rate)
-      ! A disk in a billiard collides with boundaries only.
+      ! a disk in a billiard collides with boundaries only
       if (sim%tally%collisions == 0) text = text//eol//"events_per_second = "//written(run%event_rate)
       if (run%input%settings%run%threads_asked > 1) text = text//eol//"threads = "//written(run%input%settings%run%threads)
       if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%serial_events)
       if (sim%tally%series(1) > 0) text = text//eol//"simultaneous_collisions = "//written(sim%tally%simultaneous)// &
         eol//"longest_series = "//written(sim%tally%series(1))//" collisions of "//written(sim%tally%series(2))//" disks"
-      if (sim%drive%is_on()) text = text//eol//"kicks = "//written(sim%kicks)// &
+      if (allocated(sim%drive)) text = text//eol//"kicks = "//written(sim%kicks)// &
         eol//"drive_energy = "//written(sim%tally%total(drive_energy))
-      if (allocated(sim%recycled)) text = text//eol//"recycled = "//written(sum(sim%recycled))
+      if (allocated(sim%drive_count)) text = text//eol//sim%kick_counter()//" = "//written(sum(sim%drive_count))
     end associate
     if (note(run) /= "") text = text//eol//"note = "//note(run)
   end function summary
 
-  !> A note about inelastic collapses, and about the reason why the run ended if no stop rule was met. The note is empty if no
-  !> collapse occurred and a stop rule was met.
+  !> Note about inelastic collapses, and about the end of a run that met no stop rule; empty if neither applies.
   function note(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text

@@ -1,4 +1,4 @@
-!> The type `error_t` of error values. An allocated `error_t` indicates a failure. A procedure that fails returns the `error_t` to
+!> Error values. An allocated `error_t` indicates a failure. A procedure that fails returns it to
 !> its caller, and `main` finally prints the message.
 module errors
   use texts, only: legible
@@ -10,9 +10,10 @@ module errors
   integer, parameter :: exit_finished = 0   !! exit status of a run that reached its stop rule
   integer, parameter :: exit_usage = 2      !! exit status after wrong usage, invalid input, or a checkpoint of another run
   integer, parameter :: exit_files = 3      !! exit status if a file cannot be read or written or is in use
-  !> Exit status of a simulation that broke off because events no longer advance the time, disks overlap, or a number is NaN.
+  !> Exit status of a simulation that was aborted because events no longer advanced the time, disks
+  !> overlapped, or a number became NaN.
   integer, parameter :: exit_broken = 4
-  integer, parameter :: exit_stopped = 75   !! exit status of a run that a signal or the wall-clock limit stopped, with a checkpoint
+  integer, parameter :: exit_stopped = 75   !! exit status of a run stopped by a signal or the wall-clock limit, with a checkpoint
 
   !> A failure: its message and the exit status of the program.
   type :: error_t
@@ -22,8 +23,8 @@ module errors
 
 contains
 
-  !> Allocates `error` with an exit status and a message. Control characters in the message are replaced, so that the message
-  !> remains one legible line even if a name from the input contains control characters.
+  !> Allocates `error` with an exit status and a message. Control characters are replaced, so that
+  !> the message remains one legible line even if a name from the input contains some.
   pure subroutine fail(error, code, message)
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in) :: code                !! one of the `exit_` constants

@@ -25,7 +25,7 @@ static void *obtained(void *memory, size_t bytes)
     if (!memory && bytes) {
         char text[240];
         snprintf(text, sizeof text, "%sout of memory: there is no room for %zu bytes; use fewer disks or a smaller "
-                 "starting file, or raise the limit of memory (ulimit -v, batch job)\n",
+                 "initial-configuration file, or raise the limit of memory (ulimit -v, batch job)\n",
                  isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "", bytes);
         (void)!write(STDERR_FILENO, text, strlen(text));
         _exit(3);

@@ -1,6 +1,6 @@
-!> Prefetch hints, which the Fortran language cannot express. Hints affect only the speed of a run, never its results. The file
-!> `memory_hints.c` contains the code that depends on the compiler and the operating system. If the macro `MEMORY_HINTS` is not
-!> defined, a prefetch has no effect.
+!> Prefetch hints, which Fortran cannot express. They affect only the speed of a run, never its
+!> results. The code that depends on the compiler and the operating system is in `memory_hints.c`;
+!> without the macro `MEMORY_HINTS`, a prefetch has no effect.
 module memory_hints
   use, intrinsic :: iso_c_binding, only: c_double, c_int32_t
   implicit none

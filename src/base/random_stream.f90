@@ -1,18 +1,20 @@
-!> Reproducible random numbers from the generator xoshiro256** (Blackman and Vigna, 2021, doi:10.1145/3460772). The generator
-!> SplitMix64 (Steele, Lea and Flood, 2014, doi:10.1145/2660193.2660195) seeds xoshiro256**, so that the streams of consecutive
-!> seeds are unrelated. A copy of a random stream yields the same numbers as the original stream.
+!> Reproducible random numbers from the generator xoshiro256** (Blackman and Vigna, 2021,
+!> doi:10.1145/3460772), seeded by SplitMix64 (Steele, Lea and Flood, 2014,
+!> doi:10.1145/2660193.2660195), so that the streams of consecutive seeds are unrelated. A copy of a
+!> random stream yields the same numbers as the original.
 !>
-!> Both generators, xoshiro256** and SplitMix64, use unsigned arithmetic modulo 2**64. Fortran has no unsigned integers and does not
-!> allow overflow of signed integers. Sums and products modulo 2**64 are therefore calculated with longer integers.
+!> Both generators use unsigned arithmetic modulo 2**64. Fortran has no unsigned integers and does
+!> not allow overflow of signed ones, so sums and products modulo 2**64 are calculated with longer
+!> integers.
 module random_stream
   use kinds, only: int32, int64, int128, real64
   implicit none
   private
   public :: key_of_draws, random_stream_t
 
-  !> Codes of the purposes for which random numbers are drawn during a run. Random numbers for the initial state are drawn from
-  !> other streams than random numbers during a run.
-  integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5, recycled_disks = 6
+  !> Purposes for which random numbers are drawn during a run. Random numbers for the initial state
+  !> are drawn from other streams.
+  integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5, recycled_disks = 6, entering_disks = 7
 
   real(real64), parameter :: unit_53 = 2.0_real64**(-53)
 
@@ -32,8 +34,8 @@ module random_stream
 
 contains
 
-  !> Starts the random stream that belongs to a seed and a key. Streams with different keys are independent, so that the number of
-  !> draws for one purpose never affects the random numbers for another purpose.
+  !> Starts the random stream of a seed and a key. Streams with different keys are independent, so
+  !> the number of draws for one purpose never affects the random numbers for another.
   pure subroutine seed(self, number, key)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: number        !! seed from the input; any value is allowed
@@ -48,8 +50,8 @@ contains
     call fill(self, state)
   end subroutine seed
 
-  !> Starts a separate random stream for a single draw during a run. The random numbers depend only on the arguments of the
-  !> procedure `seed_draw`, not on the order of the draws or on the thread that makes the draw.
+  !> Starts a separate random stream for a single draw during a run. Its numbers depend only on the
+  !> arguments, not on the order of the draws or on the thread.
   pure subroutine seed_draw(self, number, purpose, id, count)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: number        !! seed from the input
@@ -60,7 +62,7 @@ contains
     call self%seed_disk(key_of_draws(number, purpose), id, count)
   end subroutine seed_draw
 
-  !> Part of the key of a random stream that does not depend on the disk, for calls of `seed_disk`.
+  !> Part of the key of a random stream that does not depend on the disk, for `seed_disk`.
   pure function key_of_draws(number, purpose) result(key)
     integer(int64), intent(in) :: number        !! seed from the input
     integer, intent(in) :: purpose              !! as in `seed_draw`
@@ -71,7 +73,7 @@ contains
     call draw_seed(state, key)
   end function key_of_draws
 
-  !> Starts a random stream in the same way as `seed_draw`, for callers that have already calculated the part of the key that does
+  !> Version of `seed_draw` for callers that have already calculated the part of the key that does
   !> not depend on the disk.
   pure subroutine seed_disk(self, key, id, count)
     class(random_stream_t), intent(inout) :: self
@@ -86,7 +88,7 @@ contains
     call fill(self, state)
   end subroutine seed_disk
 
-  !> Mixes one element of a key into the state of the generator SplitMix64, which seeds a random stream.
+  !> Mixes one element of a key into the state of SplitMix64, which seeds a random stream.
   pure subroutine add_key(state, part)
     integer(int64), intent(inout) :: state
     integer, intent(in) :: part
@@ -96,7 +98,7 @@ contains
     state = ieor(word, int(part, int64))
   end subroutine add_key
 
-  !> Fills the state of a random stream with numbers from the generator SplitMix64.
+  !> Fills the state of a random stream with numbers from SplitMix64.
   pure subroutine fill(self, state)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(inout) :: state
@@ -153,8 +155,9 @@ contains
     k = 1 + int(n*u, int32)
   end subroutine draw_index
 
-  !> Draws a unit vector of random direction by normalising a random point of the unit disk. The functions sine and cosine are not
-  !> used, because the last bits of their results depend on the mathematical library.
+  !> Draws a unit vector of random direction by normalising a random point of the unit disk. Sine
+  !> and cosine are avoided, because the last bits of their results depend on the mathematical
+  !> library.
   pure subroutine draw_direction(self, e)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: e(2)
@@ -164,8 +167,9 @@ contains
     e = e/sqrt(s)
   end subroutine draw_direction
 
-  !> Draws two independent Gaussian random numbers of mean 0 and variance 1 by the polar method (Marsaglia and Bray, 1964,
-  !> doi:10.1137/1006063). The last bit of the numbers may depend on the mathematical library, because the method uses a logarithm.
+  !> Draws two independent Gaussian random numbers of mean 0 and variance 1 by the polar method
+  !> (Marsaglia and Bray, 1964, doi:10.1137/1006063). Because of the logarithm, their last bit may
+  !> depend on the mathematical library.
   pure subroutine draw_normals(self, z)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: z(2)
@@ -175,8 +179,8 @@ contains
     z = z*sqrt(-2*log(s)/s)
   end subroutine draw_normals
 
-  !> Draws a uniformly distributed point of the unit disk, and returns the squared distance of the point from the centre of the
-  !> disk. The centre itself is never drawn.
+  !> Draws a uniformly distributed point of the unit disk, except its centre, and returns its
+  !> squared distance from the centre.
   pure subroutine draw_in_disk(stream, point, s)
     class(random_stream_t), intent(inout) :: stream
     real(real64), intent(out) :: point(2), s
@@ -193,7 +197,7 @@ contains
     stream%word = state
   end subroutine draw_in_disk
 
-  !> The number in [0, 1) that 64 random bits represent: the upper 53 bits as a multiple of 2**-53.
+  !> Number in [0, 1) that 64 random bits represent: the upper 53 bits as a multiple of 2**-53.
   elemental function uniform(word) result(u)
     integer(int64), intent(in) :: word
     real(real64) :: u
@@ -215,8 +219,8 @@ contains
     word = ieor(word, ishft(word, -31))
   end subroutine draw_seed
 
-  !> Reduces a number modulo 2**64. The result consists of the lower 64 bits of the number, interpreted as a signed integer. The
-  !> argument may be the product of two 64-bit integers, whose absolute value is at most 2**126.
+  !> Reduces a number, which may be the product of two 64-bit integers (at most 2**126 in
+  !> magnitude), modulo 2**64. The result is the lower 64 bits, interpreted as a signed integer.
   pure function wrapped(number) result(word)
     integer(int128), intent(in) :: number
     integer(int64) :: word

@@ -1,8 +1,10 @@
-!> Signals that stop a run or request a checkpoint. The signal handler and the variables that it sets are in `system_calls.c`.
+!> Signals that stop a run or request a checkpoint. The signal handler and the variables that it
+!> sets are in `system_calls.c`.
 !>
-!> If the program ended suddenly while the files of a run are open, data could be lost. A stop signal that arrives while files are
-!> open is therefore only recorded, and the main loop then writes a checkpoint and ends the run. A stop signal that arrives after
-!> the end of the main loop has no effect: the program completes the file and finishes the run.
+!> Ending the program suddenly while the files of a run are open could lose data. A stop signal that
+!> arrives then is therefore only recorded; the main loop writes a checkpoint and ends the run.
+!> After the main loop a stop signal has no effect: the program completes the file and finishes the
+!> run.
 module signals
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_int, c_null_char
   use system, only: talks_to_terminal
@@ -11,9 +13,10 @@ module signals
   public :: watch_signals, end_at_signals, record_signals, stop_requested, checkpoint_requests
 
   interface
-    !> Installs the signal handler. The signals TERM, INT, HUP and XCPU request a stop with a checkpoint, and the signal USR1
-    !> requests a checkpoint. Signals that were ignored when the program was started (for example by nohup) are still ignored. The
-    !> signal XFSZ is ignored, so that a write beyond the size limit of files fails without a signal.
+    !> Installs the signal handler. TERM, INT, HUP and XCPU request a stop with a checkpoint; USR1
+    !> requests a checkpoint. Signals ignored when the program was started (for example by nohup)
+    !> stay ignored. XFSZ is ignored, so that a write beyond the size limit of files fails without a
+    !> signal.
     subroutine watch_signals() bind(C, name="system_watch_signals")
     end subroutine watch_signals
 
@@ -23,14 +26,14 @@ module signals
       logical(c_bool) :: yes
     end function stop_requested
 
-    !> Number of signals USR1 received so far; each signal requests a checkpoint.
+    !> Number of USR1 signals received so far, each of which requests a checkpoint.
     function checkpoint_requests() result(requests) bind(C, name="system_checkpoint_requests")
       import :: c_int
       integer(c_int) :: requests
     end function checkpoint_requests
 
-    !> After a call of `record_signals`, a stop signal is only recorded, and does not end the program. The function `stop_requested`
-    !> returns whether a signal has been recorded.
+    !> From this call on, a stop signal is only recorded instead of ending the program; see
+    !> `stop_requested`.
     subroutine record_signals() bind(C, name="system_record_signals")
     end subroutine record_signals
 
@@ -43,9 +46,9 @@ module signals
 
 contains
 
-  !> After a call of `end_at_signals`, a stop signal ends the program immediately, with the given message and exit status. If a stop
-  !> signal has already been recorded, the procedure itself ends the program. The procedure is called before parts of the program
-  !> that can be interrupted without a loss of data.
+  !> From this call on, a stop signal ends the program immediately, with the given message and exit
+  !> status. If one has already been recorded, the procedure itself ends the program. It precedes
+  !> parts of the program that can be interrupted without a loss of data.
   subroutine end_at_signals(message, code)
     character(len=*), intent(in) :: message
     integer, intent(in) :: code                        !! exit status

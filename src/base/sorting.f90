@@ -1,4 +1,4 @@
-!> Counting sort for items whose keys are small integers, such as the numbers of cells.
+!> Counting sort for items whose keys are small integers, such as cell numbers.
 module sorting
   use kinds, only: int32
   implicit none
@@ -7,13 +7,13 @@ module sorting
 
 contains
 
-  !> Finds the position of each item in the order of ascending keys. Items with equal keys keep their relative order.
-  pure subroutine sort_by_count(key, n_keys, first, place)
+  !> Finds the order of ascending keys. Items with equal keys keep their relative order.
+  pure subroutine sort_by_count(key, n_keys, first, order)
     integer(int32), intent(in) :: key(:)                  !! (n) key of each item, from 1 to n_keys
     integer(int32), intent(in) :: n_keys
     !> (n_keys+1) sorted position of the first item with each key; the last element is n+1.
     integer(int32), allocatable, intent(out) :: first(:)
-    integer(int32), intent(out) :: place(:)               !! (n) position of each item in the sorted order
+    integer(int32), intent(out) :: order(:)               !! (n) index of the item at each sorted position
     integer(int32), allocatable :: next(:)                ! (n_keys+1) sorted position of the next item with each key
     integer(int32) :: k
 
@@ -27,7 +27,7 @@ contains
     end do
     first = next
     do k = 1, size(key, kind=int32)
-      place(k) = next(key(k))
+      order(next(key(k))) = k
       next(key(k)) = next(key(k)) + 1
     end do
   end subroutine sort_by_count

@@ -1,5 +1,5 @@
-!> A status line on standard error that shows the progress of the program. On a terminal the status line is updated in place. If
-!> standard error is a file or a pipe, a new line is written every half minute.
+!> A status line on standard error that shows the progress of the program. On a terminal it is
+!> updated in place; in a file or a pipe a new line is written every half minute.
 module status_line
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: real64
@@ -29,7 +29,7 @@ module status_line
 
 contains
 
-  !> Prepares a status line. Before `open_line` has been called, the status line shows nothing.
+  !> Prepares a status line, which shows nothing before this call.
   subroutine open_line(self, quiet)
     class(status_line_t), intent(inout) :: self
     logical, intent(in) :: quiet

@@ -1,5 +1,6 @@
-!> Services of the operating system that Fortran does not provide: a monotonic clock, the detection of terminals, file locks, atomic
-!> renames, the free disk space, and an exit without a message. Functions that need a C header file are in `system_calls.c`.
+!> Services of the operating system that Fortran does not provide: a monotonic clock, the detection
+!> of terminals, file locks, atomic renaming, the free disk space, and an exit without a message.
+!> Functions that need a C header file are in `system_calls.c`.
 module system
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_double, c_int, c_int64_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: error_unit
@@ -17,10 +18,12 @@ module system
   character(len=20), parameter :: kinds_of_files(*) = [character(len=20) :: "nothing", "a file", "a folder", &
     "a symbolic link", "a pipe or a device", "hidden by the system"]
 
-  !> Results of `c_lock` if no lock was acquired: another run holds the lock, the file is not a lock file, or a system call failed.
+  !> Results of `c_lock` if no lock was acquired: another run holds the lock, the file is not a lock
+  !> file, or a system call failed.
   integer(c_int), parameter :: taken = -1, foreign = -3, failed = -4     ! -2: the file system has no locks
 
-  !> A lock on the output of a run. The operating system releases the lock when the process ends, even after a crash.
+  !> A lock on the output of a run. The operating system releases it when the process ends, even
+  !> after a crash.
   type :: lock_t
     character(len=:), allocatable :: path
     integer(c_int), private :: descriptor = -1
@@ -30,7 +33,7 @@ module system
   end type lock_t
 
   abstract interface
-    !> Interface of calls that have a path or a text as argument and return 0 for success.
+    !> Interface of calls that have a path or a string as argument and return 0 for success.
     function path_call(path) bind(C) result(status)
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
@@ -59,8 +62,9 @@ module system
       real(c_double) :: t
     end function seconds
 
-    !> Opens /dev/null for each standard stream that the caller has closed. If a standard stream stayed closed, the system would
-    !> assign its descriptor to the next file that is opened, and messages would be written into that file.
+    !> Opens /dev/null for each standard stream that the caller has closed. Otherwise the system
+    !> would assign its descriptor to the next file that is opened, and messages would be written
+    !> into that file.
     subroutine fill_standard_streams() bind(C, name="system_fill_standard_streams")
     end subroutine fill_standard_streams
 
@@ -70,7 +74,7 @@ module system
       logical(c_bool) :: yes
     end function talks_to_terminal
 
-    ! The functions of the following interfaces are described in the file system_calls.c.
+    ! The functions of the following interfaces are described in system_calls.c.
     function cores_of_process() result(n) bind(C, name="system_cores")
       import :: c_int
       integer(c_int) :: n
@@ -148,8 +152,8 @@ module system
 
 contains
 
-  !> Writes a text to standard output. The `write` statement of Fortran is not used, because `write` reports no error if standard
-  !> output is a file on a full disk.
+  !> Writes a string to standard output. The `write` statement of Fortran reports no error if
+  !> standard output is a file on a full disk.
   subroutine print_text(text, error)
     character(len=*), intent(in) :: text               !! one or more lines; a line end is added after the last line
     type(error_t), allocatable, intent(out) :: error
@@ -175,8 +179,9 @@ contains
     name = buffer(:index(buffer, c_null_char) - 1)
   end function host_name
 
-  !> Renames a file. A file that already has the new name is replaced atomically. `moved` is .true. after a renaming even if the
-  !> folder cannot be synchronised with the disk; only a crash of the operating system could undo such a renaming.
+  !> Renames a file, atomically replacing any file with the new name. `moved` is .true. after a
+  !> renaming even if the folder cannot be synchronised with the disk; only a crash of the operating
+  !> system could then undo it.
   subroutine move_file(from, to, moved)
     character(len=*), intent(in) :: from, to
     logical, intent(out) :: moved
@@ -217,8 +222,8 @@ contains
     done = c_synchronize(path//c_null_char) == 0
   end subroutine synchronize
 
-  !> Reason why a file cannot be opened; empty if the file can be opened. A file with a second name (a symbolic or hard link) must
-  !> not be opened for writing.
+  !> Reason why a file cannot be opened; empty if it can. A file with a second name (a symbolic or
+  !> hard link) must not be opened for writing.
   function opening_problem(path, writable) result(text)
     character(len=*), intent(in) :: path
     logical, intent(in) :: writable
@@ -237,8 +242,8 @@ contains
     kind = trim(kinds_of_files(c_what_is(path//c_null_char)))
   end function what_is
 
-  !> Inode, size and modification time of a file, which together identify the file and its contents; three zeros if the file does
-  !> not exist. A copy of a file has a different inode.
+  !> Inode, size and modification time of a file, which together identify the file and its contents;
+  !> three zeros if it does not exist. A copy of a file has a different inode.
   function identity_of(path) result(identity)
     character(len=*), intent(in) :: path
     integer(int64) :: identity(3)
@@ -254,8 +259,8 @@ contains
     bytes = c_file_size(path//c_null_char)
   end function file_size
 
-  !> Reads the first bytes of a regular file. The `open` statement of Fortran is not used, because `open` removes trailing blanks
-  !> from the name of the file.
+  !> Reads the first bytes of a regular file. The `open` statement of Fortran would remove trailing
+  !> blanks from the name of the file.
   subroutine read_bytes(path, bytes, n)
     character(len=*), intent(in) :: path
     character(len=*), intent(out) :: bytes
@@ -264,8 +269,8 @@ contains
     n = c_read_bytes(path//c_null_char, bytes, len(bytes, int64))
   end subroutine read_bytes
 
-  !> Reads all bytes of a regular file. The `read` statement of Fortran is not used, because `read` can return `iostat` 0 without
-  !> reading any bytes, which would lead to an infinite loop.
+  !> Reads all bytes of a regular file. The `read` statement of Fortran can return `iostat` 0
+  !> without reading any bytes, which would lead to an infinite loop.
   subroutine read_file(path, text, problem)
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text
@@ -286,7 +291,7 @@ contains
   !> Overwrites eight bytes of a file with a 64-bit integer in little-endian order.
   subroutine write_word(path, position, word, done)
     character(len=*), intent(in) :: path
-    integer(int64), intent(in) :: position             !! position of the first byte; the first byte of the file has the position 0
+    integer(int64), intent(in) :: position             !! position of the byte to start from; 0 is the first byte of the file
     integer(int64), intent(in) :: word
     logical, intent(out) :: done
 
@@ -327,7 +332,8 @@ contains
     text = buffer(:index(buffer, c_null_char) - 1)
   end function last_problem
 
-  !> Acquires the lock file `path` for this process. On a file system without locks the run continues without a lock.
+  !> Acquires the lock file `path` for this process. On a file system without locks the run
+  !> continues without one.
   subroutine acquire(self, path, problem)
     class(lock_t), intent(inout) :: self
     character(len=*), intent(in) :: path

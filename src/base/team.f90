@@ -1,5 +1,5 @@
-!> The threads of a run: the number of threads, and the barriers at which threads wait while one thread performs a serial step. The
-!> barriers are implemented in `team.c`.
+!> The threads of a run: their number, and the barriers at which they wait while one of them
+!> performs a serial step. The barriers are implemented in `team.c`.
 module team
   use, intrinsic :: iso_c_binding, only: c_bool, c_int64_t
 !$ use omp_lib, only: omp_set_num_threads
@@ -8,39 +8,40 @@ module team
   public :: make_team, many
   public :: barrier_t, close_barrier, is_last_at, join, open_barrier, release
 
-  !> Smallest number of iterations for which a loop is divided among threads. The barrier at the end of the loop costs microseconds,
-  !> or milliseconds if other programs use the cores.
+  !> Smallest number of iterations for which a loop is divided among threads. The barrier at its end
+  !> costs microseconds, or milliseconds if other programs use the cores.
   integer, parameter :: many = 50000
 
-  !> A barrier for threads. A barrier must not be copied while threads use the barrier.
+  !> A barrier for threads, which must not be copied while in use.
   type, bind(C) :: barrier_t
     integer(c_int64_t) :: storage(32)
   end type barrier_t
 
   interface
-    !> Initialises a barrier, with which no threads are registered at first.
+    !> Initialises a barrier, at first without registered threads.
     subroutine open_barrier(barrier) bind(C, name="barrier_open")
       import :: barrier_t
       type(barrier_t), intent(out) :: barrier
     end subroutine open_barrier
 
-    !> Registers the calling thread with the barrier. Each thread is registered once, before any thread waits at the barrier.
+    !> Registers the calling thread with the barrier, once per thread, before any thread waits
+    !> there.
     subroutine join(barrier) bind(C, name="barrier_join")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier
     end subroutine join
 
-    !> Registers the arrival of the calling thread at the barrier. The result is .true. for the last thread that arrives. The last
-    !> thread does not wait, performs the serial step, and then calls `release`. All other threads wait in `arrive` until the last
-    !> thread has called `release`.
+    !> Registers the arrival of the calling thread at the barrier. The result is .true. for the last
+    !> thread to arrive, which does not wait: it performs the serial step and then calls `release`.
+    !> All other threads wait in `arrive` until then.
     function is_last_at(barrier) result(yes) bind(C, name="barrier_arrive")
       import :: barrier_t, c_bool
       type(barrier_t), intent(inout) :: barrier
       logical(c_bool) :: yes
     end function is_last_at
 
-    !> Releases the threads that wait at the barrier. The released threads can read all data that the calling thread has written
-    !> before the call.
+    !> Releases the threads that wait at the barrier. They can then read all data written by the
+    !> calling thread before the call.
     subroutine release(barrier) bind(C, name="barrier_release")
       import :: barrier_t
       type(barrier_t), intent(inout) :: barrier
@@ -55,8 +56,8 @@ module team
 
 contains
 
-  !> Sets the number of threads for parallel loops that do not specify a number of threads. In a build without OpenMP the number of
-  !> threads is always 1.
+  !> Sets the number of threads for parallel loops that do not specify one. In a build without
+  !> OpenMP it is always 1.
   subroutine make_team(n)
     integer, intent(in) :: n
 

@@ -1,4 +1,4 @@
-!> Short texts: lists of texts, numbers as text, and suggestions for misspelt words.
+!> Short strings: lists of strings, numbers as strings, and suggestions for misspelt words.
 module texts
   use, intrinsic :: ieee_arithmetic, only: ieee_is_normal
   use kinds, only: int64, real64
@@ -7,12 +7,12 @@ module texts
   public :: text_t, growing_text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
   public :: about, counted, line_at, lines_of, size_text, wrapped
 
-  !> A text of any length; arrays of this type are lists of texts.
+  !> A string of any length; arrays of this type are lists of strings.
   type :: text_t
     character(len=:), allocatable :: text
   end type text_t
 
-  !> A text that is assembled piece by piece, in a time proportional to its length.
+  !> A string assembled piece by piece, in a time proportional to its length.
   type :: growing_text_t
     private
     character(len=:), allocatable :: buffer
@@ -22,7 +22,7 @@ module texts
     procedure :: text => text_so_far
   end type growing_text_t
 
-  !> Converts a number to a text in a short and readable form.
+  !> Converts a number to a short, readable string.
   interface written
     procedure :: written_integer, written_long_integer, written_real
   end interface written
@@ -30,6 +30,7 @@ module texts
   character(len=*), parameter :: upper_letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
   character(len=*), parameter :: lower_letters = "abcdefghijklmnopqrstuvwxyz"
   character(len=1), parameter, public :: eol = new_line("a")      !! line end
+  character(len=*), parameter, public :: byte_order_mark = char(239)//char(187)//char(191)
   character(len=*), parameter, public :: letters = lower_letters//upper_letters, digits = "0123456789"
 
 contains
@@ -52,7 +53,7 @@ contains
     self%length = needed
   end subroutine add
 
-  !> The text that consists of all pieces added so far.
+  !> The string of all pieces added so far.
   pure function text_so_far(self) result(text)
     class(growing_text_t), intent(in) :: self
     character(len=:), allocatable :: text
@@ -79,7 +80,8 @@ contains
     text = trim(buffer)
   end function written_long_integer
 
-  !> Converts a real number to a text without trailing zeros; the text has an exponent only if the exponent makes the text shorter.
+  !> Converts a real number to a string without trailing zeros, with an exponent only if that makes
+  !> it shorter.
   pure recursive function written_real(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -100,7 +102,8 @@ contains
     end if
   end function written_real
 
-  !> Converts a real number to a text with as many digits as are needed to recover exactly the same number.
+  !> Converts a real number to a string with as many digits as are needed to recover exactly the
+  !> same number.
   pure function written_exactly(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -114,7 +117,7 @@ contains
     text = trim(adjustl(buffer))
   end function written_exactly
 
-  !> The text with ASCII letters in lower case; other bytes are unchanged.
+  !> The string with ASCII letters in lower case and all other bytes unchanged.
   pure function lower_case(text) result(lower)
     character(len=*), intent(in) :: text
     character(len=len(text)) :: lower
@@ -127,7 +130,7 @@ contains
     end do
   end function lower_case
 
-  !> The text with each control character replaced by `?`.
+  !> The string with each control character replaced by `?`.
   pure function legible(text) result(line)
     character(len=*), intent(in) :: text
     character(len=len(text)) :: line
@@ -139,8 +142,8 @@ contains
     end do
   end function legible
 
-  !> A text from a user or a file, prepared for a message: the text is quoted, control characters are replaced, and a long text is
-  !> truncated.
+  !> A string from a user or a file, prepared for a message: quoted, with control characters
+  !> replaced, and truncated if long.
   pure function shown(text) result(quoted)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted
@@ -172,8 +175,8 @@ contains
     line = growing%text()
   end function joined
 
-  !> Breaks a text at blanks into lines of at most `width` characters. All lines except the first line start with `margin`. A word
-  !> that is longer than `width` is placed on a separate line.
+  !> Breaks a text at blanks into lines of at most `width` characters, all but the first starting
+  !> with `margin`. A word longer than `width` has a line of its own.
   pure function wrapped(text, width, margin) result(lines)
     character(len=*), intent(in) :: text, margin
     integer, intent(in) :: width
@@ -192,7 +195,7 @@ contains
     lines = lines//trim(text(first:))
   end function wrapped
 
-  !> Position of a word in a list of words; 0 if the list does not contain the word.
+  !> Position of a word in a list; 0 if it is not there.
   pure function place_of(word, words) result(place)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: words(:)
@@ -204,8 +207,8 @@ contains
     place = 0
   end function place_of
 
-  !> Advice for a user who entered an unknown word: the most similar known word or, if no known word is similar, a list of the known
-  !> words.
+  !> Advice for a user who entered an unknown word: the most similar known word or, if none is
+  !> similar, a list of the known words.
   pure function suggestion(word, known, listed) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
@@ -222,8 +225,8 @@ contains
     end if
   end function suggestion
 
-  !> The known word that a user probably meant by `word`: a known word that starts with `word`, or a known word in which at most a
-  !> third of the letters differ. The result is empty if `word` resembles no known word.
+  !> The known word that a user probably meant by `word`: one that starts with `word`, or that
+  !> differs in at most a third of the letters; empty if there is none.
   pure function nearest_word(word, known) result(nearest)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
@@ -281,7 +284,7 @@ contains
     end if
   end function size_text
 
-  !> Rounds a positive number to three significant digits and converts the number to a text.
+  !> Rounds a positive number to three significant digits and converts it to a string.
   pure function about(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -291,7 +294,8 @@ contains
     text = written(anint(number/unit)*unit)
   end function about
 
-  !> A number followed by a noun, which is in the plural unless the number is 1, as in `1 value` and `2 values`.
+  !> A number followed by a noun, in the plural unless the number is 1, as in `1 value` and `2
+  !> values`.
   pure function counted(number, noun) result(text)
     integer(int64), intent(in) :: number
     character(len=*), intent(in) :: noun
@@ -301,7 +305,8 @@ contains
     if (number /= 1) text = text//"s"
   end function counted
 
-  !> Number of the line that contains character k of a text; k may also be the position just after the end of the text.
+  !> Number of the line that contains character k of a text; k may also be the position just after
+  !> its end.
   pure function line_at(text, k) result(line)
     character(len=*), intent(in) :: text
     integer, intent(in) :: k                      !! position of the character
@@ -323,7 +328,7 @@ contains
     do while (first <= len(text))
       last = first - 1 + index(text(first:)//eol, eol)
       line%text = text(first:last - 1)
-      ! A constructor text_t(...) is not used, because it would leak memory with gfortran 12.
+      ! text_t(...) would leak memory with gfortran 12
       lines = [lines, line]
       first = last + 1
     end do

@@ -1,9 +1,10 @@
-!> Calendar: the part of the event queue that contains events of later times. Time is divided into windows of equal length. Each of
-!> the next windows has a bucket: an array that occupies one cache line. The time after the windows with buckets is divided into
-!> spans of many windows, and each span has an unordered list of events. A new entry is appended at the end of a bucket or of a
-!> list, so that few cache lines are accessed. No procedure searches a bucket or a list for the entry of a particular disk, or
-!> removes a single entry. All lists share one array, which is divided into chunks. The chunks of a list are reused after the span
-!> of the list has been processed.
+!> Calendar: the part of the event queue for events of later times. Time is divided into windows of equal length. The next windows
+!> have a bucket each: an array that fills one cache line. Later times are divided into spans of many windows, each with an
+!> unordered list of events.
+!>
+!> New entries are appended at the end, which accesses few cache lines. Entries of particular disks are never searched for, and
+!> single entries never removed. All lists share one array, divided into chunks; those of a list are reused once its span has been
+!> processed.
 module calendar
   use kinds, only: int32, real64
   use disks, only: tag_t
@@ -12,11 +13,11 @@ module calendar
   public :: bucket_capacity, bucket_t, calendar_t, events_per_window, filed_t, most_coming, stages, window_none
 
   integer(int32), parameter :: bucket_capacity = 15
-  !> Intended mean number of events in a window. With fewer events per window, the program would process more empty windows. With
-  !> more events per window, more events would have to be stored in the heap, because a bucket has space for only a few events.
+  !> Intended mean number of events in a window. With fewer, more empty windows would be processed; with more, the small buckets
+  !> would overflow more often, and more events would go to the heap.
   real(real64), parameter :: events_per_window = 4.0_real64
   integer(int32), parameter :: few_disks = 5000    !! number of disks up to which nearly all events fit into buckets
-  !> For each stage of prefetching, the number of windows between the current window and the last prefetched window.
+  !> Distance, in windows, between the current window and the last one prefetched, for each stage of prefetching.
   integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]
   integer(int32), parameter :: stages = size(windows_ahead)
   integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity
@@ -29,13 +30,13 @@ module calendar
   end type bucket_t
 
   integer(int32), parameter :: log_chunk = 7
-  !> Number of entries in a chunk. A chunk is a part of a list and occupies 1 KiB. The first entry of a chunk is a link to another
-  !> chunk of the same list.
+  !> Number of entries in a chunk, a part of a list that occupies 1 KiB. Its first entry is a link to another chunk of the same
+  !> list.
   integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)
   integer(int32), parameter :: none = -1
 
-  !> An entry: a disk and the window of its event. In the first entry of a chunk, which is a link, `disk` contains the number of the
-  !> previous chunk of the list instead of a disk.
+  !> An entry: a disk and the window of its event. In the link at the start of a chunk, `disk` is the number of the previous chunk
+  !> of the list.
   type :: filed_t
     integer(int32) :: disk
     integer(int32) :: window
@@ -43,11 +44,11 @@ module calendar
 
   type :: calendar_t
     type(bucket_t), allocatable :: bucket(:)       !! (0:last_bucket) circular buffer of the buckets of the next windows
-    !> (0:last_span) position in `filed` after the last entry in the list of each span, 0 if the list is empty. `list_end` is a
-    !> circular buffer, like `bucket`. The number of windows in a span is half the number of buckets. Because the buffer is
-    !> circular, the list of a span can also contain events of later spans that use the same element of `list_end`.
+    !> (0:last_span) position in `filed` after the last entry in the list of each span; 0 for an empty list. A span has half as many
+    !> windows as there are buckets. Like `bucket`, this is a circular buffer, so that a list can also contain events of later spans
+    !> that use the same element.
     integer(int32), allocatable :: list_end(:)
-    !> (0:) the chunks of all lists. Each chunk contains a link to the previous chunk of the same list.
+    !> (0:) the chunks of all lists, each with a link to the previous chunk of the same list
     type(filed_t), allocatable :: filed(:)
     integer(int32) :: n_chunks = 0                 !! number of chunks that have been used
     integer(int32) :: vacant = none                !! number of the first chunk in the list of free chunks
@@ -69,10 +70,9 @@ module calendar
 
 contains
 
-  !> Empties the calendar, and chooses the numbers of buckets and spans. The numbers of buckets and spans are so large that all
-  !> windows together contain at least 2n events on average, so that most events of n disks fit into the calendar. If there are many
-  !> disks, the number of buckets is limited, so that buckets and disks fit into the cache together. The number of different cache
-  !> lines to which the program writes is smallest if there are as many buckets as spans.
+  !> Empties the calendar, and chooses the numbers of buckets and spans. On average, all windows together hold at least 2n events,
+  !> so that most events of n disks fit into the calendar. For many disks the number of buckets is limited, so that buckets and
+  !> disks fit into the cache together. Equal numbers of buckets and spans minimise the number of cache lines written to.
   subroutine empty(self, n)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: n                !! number of disks
@@ -94,7 +94,7 @@ contains
     end if
     if (.not. allocated(self%bucket)) then
       allocate (self%bucket(0:self%last_bucket), self%list_end(0:self%last_span))
-      ! The operating system provides memory only for the part of the array that is used.
+      ! The operating system allocates memory only for the part of the array in use.
       allocate (self%filed(0:chunk*(self%last_span + 1 + 2*n/chunk) - 1))
     end if
     self%bucket%n = 0
@@ -112,8 +112,8 @@ contains
     self%announced = window
   end subroutine begin
 
-  !> Adds a disk to the bucket of a window that is later than the current window and earlier than `ring_end`, unless the bucket is
-  !> full.
+  !> Adds a disk to the bucket of a window between the current window and `ring_end`, unless the
+  !> bucket is full.
   subroutine put_near(self, i, window, full)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: i, window
@@ -176,13 +176,13 @@ contains
     yes = iand(window, shiftl(1_int32, self%log_span) - 1) == 0
   end function span_begins
 
-  !> Moves the events of the next span into their buckets. Events of later spans can be in the same list as the events of the next
-  !> span, and stay in the list if they are still valid. Disks whose events do not fit into a full bucket are returned in `surplus`.
+  !> Moves the events of the next span into their buckets. Valid events of later spans in the same list stay there. Disks whose
+  !> buckets are full are returned in `surplus`.
   subroutine open_span(self, tag, n_surplus, surplus)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(out) :: n_surplus
-    integer(int32), allocatable, intent(inout) :: surplus(:)     !! (n_surplus) disks whose events do not fit into a bucket
+    integer(int32), allocatable, intent(inout) :: surplus(:)     !! (n_surplus) disks whose buckets are full
     type(filed_t) :: filed
     integer(int32) :: s, c, k, list_end, before
     logical :: full
@@ -213,16 +213,16 @@ contains
     end do
   end subroutine open_span
 
-  !> Lists disks that probably have events in the next windows, for one stage of prefetching. Each stage of prefetching lists the
-  !> disks of a window exactly once. The first stage of prefetching is the farthest ahead of the current window, and each later
-  !> stage is closer. All stages of prefetching except the first stage omit disks whose entries have become invalid.
+  !> Lists disks with probable events in the next windows, for one stage of prefetching. Each stage lists the disks of a window
+  !> exactly once. The first stage is farthest ahead of the current window; later stages are closer, and omit disks whose entries
+  !> have become invalid.
   subroutine list_coming(self, tag, window, stage, n, disks)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(in) :: window           !! current window
     integer(int32), intent(in) :: stage
     integer(int32), intent(out) :: n
-    integer(int32), intent(out) :: disks(most_coming)    !! (n) disks that probably have events soon
+    integer(int32), intent(out) :: disks(most_coming)    !! (n) disks with probable events in the next windows
     integer(int32) :: w, last, k
     logical :: valid
 

@@ -1,33 +1,66 @@
 !> Changes a running simulation: forces, contact laws, motions of sides, positions and velocities. Each change takes effect at the
-!> present time, for all disks at once. The resulting change of the energy is counted as work.
+!> present time for all disks at once, and the resulting change of the energy counts as work. Scheduled changes are made by
+!> `timeline` when they are due.
 module changes
+  use box_geometry, only: box_t
   use box_sides, only: bounds
   use disks, only: advance_disk
   use epochs, only: restart_epoch
+  use errors, only: error_t, exit_broken, fail
   use kinds, only: int32, int64, never, real64
   use partners, only: n_sides
   use observables, only: total_energy
-  use side_motion, only: piston, side_state_t
   use sample_values, only: wrap
-  use simulation_state, only: simulation_t, system_t
+  use simulation_state, only: change_t, simulation_t, system_t
   use tally, only: work
+  use texts, only: eol, written, written_exactly
   implicit none
   private
-  public :: change_positions, change_system, change_velocities
+  public :: change_positions, change_system, change_velocities, continue_sides, make_scheduled_change, missing_data
+  public :: text_of_change
 
 contains
 
-  !> Replaces the box, the contact law and the drive of a simulation by those of another input with the same disks. The new box,
-  !> contact law and drive take effect at the present time. A side must not jump: its old and new positions at the present time must
-  !> be equal.
+  !> Makes the next of the scheduled changes.
+  subroutine make_scheduled_change(sim, error)
+    type(simulation_t), intent(inout) :: sim
+    type(error_t), allocatable, intent(out) :: error
+    type(system_t) :: system
+    character(len=:), allocatable :: problem
+
+    sim%changes_made = sim%changes_made + 1
+    associate (change => sim%schedule(sim%changes_made))
+      if (change%is_empty) return
+      system = change%system
+      system%box%obstacle = sim%box%obstacle
+      call change_system(sim, system, problem)
+      if (problem /= "") call fail(error, exit_broken, change%origin//": "//problem)
+    end associate
+  end subroutine make_scheduled_change
+
+  !> A line `TIME GROUP.VARIABLE=VALUE` for each variable of a change.
+  pure function text_of_change(change) result(text)
+    type(change_t), intent(in) :: change
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ""
+    do k = 1, size(change%lines)
+      text = text//written_exactly(change%time)//" "//change%lines(k)%text//eol
+    end do
+  end function text_of_change
+
+  !> Replaces box, contact law and driving of a simulation by those of another input with the same disks, at the present time. Sides
+  !> start new motions from their present positions: the old and the new law of motion must give the same position at the present
+  !> time.
   subroutine change_system(sim, system, problem)
     type(simulation_t), intent(inout) :: sim
     type(system_t), intent(in) :: system
     !> Reason why the system cannot be replaced; empty if the system has been replaced.
     character(len=:), allocatable, intent(out) :: problem
     type(simulation_t) :: other
-    ! Energy before the change [energy], old and new positions of the sides [length], velocity of a side [length/time]
-    real(real64) :: before, here(2, 2), there(2, 2), v
+    real(real64) :: before                                   ! energy before the change [energy]
+    real(real64) :: here(2, 2), there(2, 2)                  ! old and new positions of the sides [length]
     integer :: k
 
     problem = ""
@@ -35,46 +68,99 @@ contains
     other%system_t = system
     other%features%own_sizes = sim%features%own_sizes
     other%box%epoch = sim%box%epoch
-    do k = 1, n_sides                                        ! a new piston has the position and velocity of the old side
-      if (other%box%surface(k)%motion%kind /= piston) cycle
-      v = 0
-      if (sim%box%surface(k)%motion%moves()) v = sim%box%side_velocity(k, sim%now)
-      other%box%side(k) = side_state_t(sim%box%side_position(k, sim%now), v, sim%now)
+    call continue_sides(sim%box, other%box, sim%now)
+    do k = 1, n_sides                                        ! a new piston has the position and velocity of the previous side
+      if (.not. other%box%side(k)%is_piston()) cycle
+      associate (state => other%box%side(k)%state)
+        state%position = sim%box%side_position(k, sim%now)
+        state%velocity = 0
+        if (sim%box%side(k)%moves()) state%velocity = sim%box%side_velocity(k, sim%now)
+        state%clock = sim%now
+      end associate
     end do
     call bounds(sim%box, sim%now, here(:, 1), here(:, 2))
     call bounds(other%box, sim%now, there(:, 1), there(:, 2))
-    if ((other%features%rotation .neqv. sim%features%rotation) .or. &
-      (other%features%orientation .neqv. sim%features%orientation) .or. &
-      (other%law%contact_time > 0 .neqv. sim%law%contact_time > 0) .or. &
-      (other%drive%moves_disks() .neqv. sim%drive%moves_disks())) then
-      problem = "the change needs data that the disks do not have: rotation, orientation, contact_time > 0 and " &
-        //"drive.kind = 'recycle' must be there from the start"
-    else if (any(abs(there - here) > 1.0e-12_real64*minval(sim%box%edges()))) then
+    problem = missing_data(sim%system_t, other%system_t)
+    if (problem == "" .and. any(abs(there - here) > 1.0e-12_real64*minval(sim%box%edges()))) &
       problem = "a side would jump: at this time the new motion must have the position of the old one"
-    end if
+    if (problem == "" .and. (other%features%open .neqv. sim%features%open)) problem = "side.open can change during a run only if " &
+      //"the input has a source, waiting disks, a side with the variable open, or a &change of open"
+    if (problem == "") problem = disk_in_the_way(sim, other%box)
     if (problem /= "") return
     before = total_energy(sim)
     call advance_all(sim)
     sim%system_t = other%system_t
     call sim%fit_series()
     call count_kicks()
+    if (allocated(sim%source_time)) sim%source_time = max(sim%source_time, nearest(sim%time(), -1.0_real64))
     call restart_epoch(sim)
     call book(sim, before)
   contains
 
-    !> Sets `kicks` to the number of kicks that the new driving would have applied since the start of the run. The time and the
-    !> random numbers of the next kick depend on the number of previous kicks.
+    !> Sets `kicks` to the number of kicks that the new driving would have applied since the start of the run; time and random
+    !> numbers of the next kick depend on this number.
     subroutine count_kicks()
-      if (.not. sim%drive%is_on()) return
+      if (.not. allocated(sim%drive)) return
       sim%kicks = int(min(sim%time()/sim%drive%interval, 2.0_real64**62), int64)
-      do while (sim%drive%time_of(sim%kicks + 1) <= sim%time())
+      do while (sim%kick_time(sim%kicks + 1) <= sim%time())
         sim%kicks = sim%kicks + 1
       end do
-      do while (sim%drive%time_of(sim%kicks) > sim%time())
+      do while (sim%kick_time(sim%kicks) > sim%time())
         sim%kicks = sim%kicks - 1
       end do
     end subroutine count_kicks
   end subroutine change_system
+
+  !> Reason why an open side cannot be closed: a disk overlaps it. Empty if no such side is being closed.
+  pure function disk_in_the_way(sim, box) result(problem)
+    type(simulation_t), intent(in) :: sim
+    type(box_t), intent(in) :: box                           !! box after the change
+    character(len=:), allocatable :: problem
+    real(real64) :: x(2), gap(n_sides)                       ! [length]
+    integer(int32) :: i, first
+    integer :: k
+
+    problem = ""
+    if (.not. any(sim%box%open .and. .not. box%open)) return
+    first = 0
+    do i = 1, sim%n_disks()
+      if (.not. sim%is_inside(i)) cycle
+      x = sim%position(i)
+      gap([1, 3]) = x - box%lower
+      gap([2, 4]) = box%upper - x
+      if (.not. any(sim%box%open .and. .not. box%open .and. gap < sim%disk(i)%radius)) cycle
+      if (first > 0) then
+        if (sim%tag(first)%id < sim%tag(i)%id) cycle
+      end if
+      first = i
+      k = findloc(sim%box%open .and. .not. box%open .and. gap < sim%disk(i)%radius, .true., dim=1)
+    end do
+    if (first > 0) problem = "side."//box%surface(k)%name//".open: disk "//written(sim%tag(first)%id) &
+      //" overlaps the line of the side, which can be closed only when no disk does"
+  end function disk_in_the_way
+
+  !> Reason why the disks lack data needed by another system; empty if they do not.
+  pure function missing_data(one, other) result(problem)
+    type(system_t), intent(in) :: one, other
+    character(len=:), allocatable :: problem
+
+    problem = ""
+    if ((one%features%rotation .neqv. other%features%rotation) .or. &
+      (one%features%orientation .neqv. other%features%orientation) .or. &
+      (one%law%contact_time > 0 .neqv. other%law%contact_time > 0) .or. &
+      one%kick_counter() /= other%kick_counter()) &
+      problem = "the change needs data that the disks do not have: rotation, orientation, contact_time > 0 and " &
+        //"drive.kind = 'recycle' must be there from the start"
+  end function missing_data
+
+  !> Starts new motions of sides from their present positions; unchanged motions continue.
+  pure subroutine continue_sides(before, after, t)
+    type(box_t), intent(in) :: before
+    type(box_t), intent(inout) :: after
+    real(real64), intent(in) :: t                            !! time relative to the time origin `box%epoch` [time]
+
+    call after%side%follow(before%side, before%epoch, t)
+  end subroutine continue_sides
 
   !> Sets the velocities of all disks.
   subroutine change_velocities(sim, v)
@@ -86,6 +172,7 @@ contains
     before = total_energy(sim)
     call advance_all(sim)
     do i = 1, sim%n_disks()
+      if (.not. sim%is_inside(i)) cycle
       old = sim%disk(i)%v
       sim%disk(i)%v = v(:, sim%tag(i)%id)
       call sim%record_velocity_change(i, old, sim%now)
@@ -95,8 +182,8 @@ contains
     call book(sim, before)
   end subroutine change_velocities
 
-  !> Sets the positions of all disks, without a test for overlaps. A new position beyond a periodic side is interpreted as the
-  !> position of a periodic image of the disk.
+  !> Sets the positions of all disks, without a test for overlaps. Positions beyond a periodic side belong to periodic images of the
+  !> disks.
   subroutine change_positions(sim, x)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: x(:, :)                      !! (2,n) new positions in the order of ids [length]
@@ -107,6 +194,7 @@ contains
     before = total_energy(sim)
     call advance_all(sim)
     do i = 1, sim%n_disks()
+      if (.not. sim%is_inside(i)) cycle
       image = 0
       if (any(sim%box%periodic)) image = sim%extra(i)%image
       old = sim%disk(i)%x
@@ -120,15 +208,15 @@ contains
     call book(sim, before)
   end subroutine change_positions
 
-  !> Advances all disks to the present time with the previous forces. When the procedure returns, the clocks of all disks are equal.
-  !> The procedure also erases the last collision partner of each disk. A disk whose velocity has been changed can collide with its
-  !> last partner again immediately. If the last partner were not erased, the new collision would be mistaken for a rounding error
-  !> of the previous collision.
+  !> Advances all disks to the present time under the previous forces, so that all clocks are equal, and erases the last collision
+  !> partners. With its new velocity, a disk may collide with its last partner again immediately, which would otherwise be mistaken
+  !> for a rounding error of the previous collision.
   subroutine advance_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
 
     do i = 1, sim%n_disks()
+      if (.not. sim%is_inside(i)) cycle
       call sim%rotate_to(i, sim%now)
       call advance_disk(sim%disk(i), sim%box%gravity, sim%now)
       sim%tag(i)%last_partner = 0

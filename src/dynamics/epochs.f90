@@ -1,42 +1,38 @@
-!> Divides a run into epochs. At the end of each epoch the time origin moves, and the state is tested for an inelastic collapse. The
-!> end of an epoch and the detection of a collapse depend only on the state of the simulation, and not on the search, the queue or
-!> the number of threads.
+!> Divides a run into epochs. At the end of an epoch the time origin moves, and the state is tested for an inelastic collapse. Both
+!> depend on the state of the simulation alone, not on the search, the queue or the number of threads.
 module epochs
   use box_sides, only: separate_from_sides
   use kinds, only: int32, int64, never, pi, real64
-  use partners, only: n_sides
+  use partners, only: axis_of, is_side, sense_of
   use renumbering, only: renumber
   use shapes, only: magnitude
-  use side_motion, only: constant_velocity
   use simulation_state, only: simulation_t
   implicit none
   private
   public :: are_crushed, restart_epoch, begin_first_epoch, ends_by_event, ends_by_kick, is_at_rest, last_time, most_events
-  public :: has_come_to_rest, move_epoch, stands_still
+  public :: disk_on_side, has_come_to_rest, move_epoch, stands_still
 
-  !> Intended number of collisions per disk in an epoch. The time origin moves at the end of each epoch, so that times keep their
-  !> precision.
+  !> Intended number of collisions per disk in an epoch. Moving the time origin at its end preserves
+  !> the precision of times.
   integer(int64), parameter :: epoch_length = 24
-  !> Number of significant bits in a shift of the time origin. Shifts with at most 20 significant bits can be added without rounding
-  !> errors.
+  !> Number of significant bits in a shift of the time origin: so few that adding shifts causes no rounding errors.
   integer, parameter :: significant_bits = 20
-  !> An inelastic collapse is reported if the time does not advance during a long series of events. The series must have at least
-  !> `collapse_length` events, and at least `collapse_length_per_disk` events per disk.
+  !> A collapse is reported if time does not advance during at least `collapse_length` events, and
+  !> at least `collapse_length_per_disk` events per disk.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
   real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
   real(real64), parameter :: last_time = 0.5_real64*never
   real(real64), parameter :: crushing = 1.0e6_real64 !! growth factor of the energy above which disks are considered crushed
   real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate of the event rate
-  !> Largest factor by which a single event may increase the speed of the fastest disk, and largest number of edges of the box that
-  !> a disk may travel in an epoch thereafter. A kick ends the epoch if a disk, at its new speed,
-  !> would have travelled more than this number of edges since the time origin. With a larger number, rounding errors of the time
-  !> would displace disks noticeably.
+  !> Largest factor by which a single event may increase the speed of the fastest disk, and largest number of box edges that a disk
+  !> may then travel in an epoch. A kick ends the epoch if a disk at its new speed would have travelled farther since the time
+  !> origin, because rounding errors of the time would displace it noticeably.
   real(real64), parameter :: farthest = 1.0e3_real64
 
 contains
 
-  !> Chooses the length of the first epoch from an estimate of the event rate. Sets `negligible_time`, the time within which no disk
-  !> moves noticeably.
+  !> Chooses the length of the first epoch from an estimate of the event rate, and sets `negligible_time`, in which no disk moves
+  !> noticeably.
   pure subroutine begin_first_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: mean                           ! mean squared speed [length**2/time**2]
@@ -46,7 +42,7 @@ contains
     sim%negligible_time = time_to_move(sim, max(sqrt(mean), sim%fastest_drive(), fastest_disk(sim)))
     do i = 1, sim%n_disks()
       associate (v => sim%disk(i)%v)
-        mean = mean + dot_product(v, v)/sim%n_disks()
+        mean = mean + dot_product(v, v)/max(sim%n_inside(), 1_int32)
       end associate
     end do
     mean = mean + sim%fastest_drive()**2
@@ -55,8 +51,8 @@ contains
     sim%events_then = sim%tally%events
   contains
 
-    !> Mean number of events of a disk per length of its path. The estimate includes collisions with walls, and collisions with
-    !> other disks according to the equation of state of Henderson (Molecular Physics 30, 971 (1975)).
+    !> Mean number of events of a disk per length of its path: collisions with walls, and with other disks according to Henderson's
+    !> equation of state (Molecular Physics 30, 971 (1975)).
     pure function events_per_path() result(rate)
       real(real64) :: rate                           !! [1/length]
       real(real64) :: packing
@@ -67,7 +63,7 @@ contains
     end function events_per_path
   end subroutine begin_first_epoch
 
-  !> Time within which a disk of a given speed does not move noticeably.
+  !> Time in which a disk of a given speed does not move noticeably.
   pure function time_to_move(sim, speed) result(time)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: speed              !! [length/time]
@@ -94,12 +90,11 @@ contains
     sim%epoch_events = sim%tally%events
   end subroutine begin_epoch
 
-  !> Ends the epoch and moves the time origin to about the present time, so that times stay small and keep their precision. The
-  !> procedure also sorts the disks by cells, because all events have to be predicted again after a shift of the time origin in any
-  !> case. The next epoch ends at a fixed time and not after a fixed number of events, so that domains that run independently of
-  !> each other end the epoch at the same time.
-  !> If a single event or a kick has ended the epoch (see `ends_by_event` and `ends_by_kick`), a disk can be much faster than
-  !> before. The time origin then moves exactly to the present time.
+  !> Ends the epoch and moves the time origin to about the present time, which preserves the precision of times. All events must
+  !> then be predicted anew, so this is also when the disks are sorted by cells. The next epoch ends at a fixed time instead of a
+  !> fixed number of events, so that domains can end it independently at the same time. If a single event or a kick has ended the
+  !> epoch (see `ends_by_event` and `ends_by_kick`), a disk can be much faster than before, and the time origin moves exactly to the
+  !> present time.
   subroutine move_epoch(sim, is_urgent)
     type(simulation_t), intent(inout) :: sim
     logical, intent(in) :: is_urgent               !! whether a single event or a kick has ended the epoch
@@ -122,9 +117,9 @@ contains
     call begin_epoch(sim, length)
   end subroutine move_epoch
 
-  !> Ends the epoch because the disks, the forces or the contact laws have been changed. The time origin moves exactly to the
-  !> present time. The length of the next epoch is determined when the evolution starts, because disks can be much faster after a
-  !> change of the disks, forces or contact laws. In time-stepped dynamics, which has no epochs, the procedure does nothing.
+  !> Ends the epoch after a change of the disks, the forces or the contact laws, moving the time origin exactly to the present time.
+  !> Disks can be much faster after such a change, so the length of the next epoch is determined when the evolution starts.
+  !> Time-stepped dynamics has no epochs and is not affected.
   subroutine restart_epoch(sim)
     type(simulation_t), intent(inout) :: sim
 
@@ -134,7 +129,7 @@ contains
     sim%epoch_end = 0
   end subroutine restart_epoch
 
-  !> Moves the time origin `box%epoch` by `shift`. All predicted events become invalid and have to be predicted again.
+  !> Moves the time origin `box%epoch` by `shift`. All events must then be predicted anew.
   subroutine move_origin(sim, shift)
     type(simulation_t), intent(inout) :: sim
     real(real64), value :: shift                    !! [time]
@@ -149,15 +144,15 @@ contains
     sim%now = sim%now - shift
     sim%last_advance = sim%last_advance - shift
     sim%box%epoch = sim%box%epoch + shift
-    sim%box%side%clock = sim%box%side%clock - shift
-    if (.not. any(sim%box%surface(:n_sides)%motion%moves())) return      ! rounding affects only contacts with moving sides
+    sim%box%side%state%clock = sim%box%side%state%clock - shift
+    if (.not. any(sim%box%side%moves())) return      ! rounding affects only contacts with moving sides
     do i = 1, sim%n_disks()
-      call separate_from_sides(sim%box, sim%disk(i), sim%now)
+      if (sim%is_inside(i)) call separate_from_sides(sim%box, sim%disk(i), sim%now)
     end do
   end subroutine move_origin
 
-  !> Number of events since the start of the run at which the epoch ends early. An epoch ends early only if the event rate is far
-  !> higher than expected, for example before an inelastic collapse.
+  !> Number of events since the start of the run at which the epoch ends early: only if the event rate is far higher than expected,
+  !> for example before an inelastic collapse.
   pure function most_events(sim) result(n)
     type(simulation_t), intent(in) :: sim
     integer(int64) :: n
@@ -165,9 +160,9 @@ contains
     n = sim%epoch_events + 2*events_per_epoch(sim)
   end function most_events
 
-  !> Whether the first event ends the epoch, because this event can make a disk so fast that the time since the time origin is no
-  !> longer exact enough. Slow disks become fast if they are rough and rotate fast, or if they reach a boundary that moves or is
-  !> hot. The result must depend on the state alone. It is therefore .false. if velocities also change without events.
+  !> Whether the first event ends the epoch, because it can make a disk so fast that the time since the time origin is too inexact.
+  !> Slow disks become fast if they are rough and rotate fast, or if they reach a moving or hot boundary. Since the result must
+  !> depend on the state alone, it is .false. if velocities also change without events.
   pure function ends_by_event(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -183,8 +178,7 @@ contains
     if (possible*sim%epoch_end > farthest*maxval(sim%box%edges())) yes = possible > farthest*fastest_disk(sim)
   end function ends_by_event
 
-  !> Whether a kick ends the epoch, because it has made a disk so fast that the time since the time origin is no longer exact
-  !> enough.
+  !> Whether a kick ends the epoch, because it has made a disk so fast that the time since the time origin is too inexact.
   pure function ends_by_kick(sim, kicked) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: kicked(:)        !! (n) indices of the disks that the kick has accelerated
@@ -213,21 +207,21 @@ contains
     end do
   end function fastest_disk
 
-  !> Whether moving sides compress the disks beyond close packing, so that their energy grows without limit. The result is .false.
-  !> for simulations in which driving or thermal walls supply energy to the disks.
+  !> Whether moving sides compress the disks beyond close packing, so that their energy grows without limit; .false. if driving or
+  !> thermal walls supply energy.
   pure function are_crushed(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
     associate (box => sim%box)
-      yes = any(box%surface(:n_sides)%motion%kind == constant_velocity) .and. .not. (sim%drive%is_on() &
+      yes = any(box%side%has_stroke()) .and. .not. (allocated(sim%drive) .or. allocated(sim%source) &
         .or. box%highest_temperature() > 0)
       if (yes) yes = sim%kinetic_energy() > crushing*(sim%start_energy &
         + sum(sim%masses())*(box%highest_speed()**2 + sum(abs(box%gravity)*box%edges())))
     end associate
   end function are_crushed
 
-  !> Whether the time has not advanced during a long series of events, as in an inelastic collapse.
+  !> Whether time has stopped advancing during a long series of events, as in an inelastic collapse.
   pure function stands_still(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -236,9 +230,9 @@ contains
       .and. sim%tally%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
   end function stands_still
 
-  !> Whether all disks under gravity are at rest at the end of an epoch. The test is made only there, so that it does not depend on
-  !> the times at which the caller pauses. A state in which the epoch has ended in spite of this remains the last state of the run.
-  !> The whole epoch must consist of unresolved bounces: those of a ball whose bounces still converge are all executed.
+  !> Whether all disks under gravity are at rest at the end of an epoch; testing only there makes the result independent of the
+  !> caller's pauses. The whole epoch must consist of unresolved bounces, because a ball whose bounces still converge must execute
+  !> all of them. If the epoch has ended in such a state, that state is the last of the run.
   pure function has_come_to_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -247,7 +241,7 @@ contains
 
     yes = sim%box%has_gravity() .and. sim%tally%events > sim%epoch_events &
       .and. (sim%tally%events >= most_events(sim) .or. sim%now >= sim%epoch_end)
-    if (yes) yes = is_at_rest(sim)                 ! first, because this ends at the first disk that moves
+    if (yes) yes = is_at_rest(sim)                 ! first, because it returns at the first moving disk
     if (.not. yes) return
     longest = 0
     do i = 1, sim%n_disks()
@@ -256,8 +250,8 @@ contains
     yes = sim%now - sim%epoch_begin <= real(sim%tally%events - sim%epoch_events, real64)*longest
   end function has_come_to_rest
 
-  !> Largest duration of a bounce of disk i that is negligible, or that its coordinates do not resolve [time]: the bounce is lower
-  !> than an eighth of their spacing.
+  !> Longest bounce of disk i that is negligible, or too low to be resolved: lower than an eighth of the spacing of the disk's
+  !> coordinates [time]
   pure function unresolved_bounce(sim, i) result(long)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
@@ -266,11 +260,11 @@ contains
     long = max(sim%negligible_time, sqrt(spacing(maxval(abs(sim%disk(i)%x)))/magnitude(sim%box%gravity)))
   end function unresolved_bounce
 
-  !> Whether all disks are at rest. A disk that bounces inelastically on a surface at rest makes infinitely many bounces in a finite
-  !> time, because the durations of the bounces form a convergent series. With gravity a disk is considered at rest if its last
-  !> bounce occurred less than `negligible_time` ago, and its remaining bounces would end within `negligible_time`. Bounces that are
-  !> lower than an eighth of the spacing of the coordinates are rest, too, because rounding errors can make them endless. Without
-  !> gravity a disk is at rest if it does not move.
+  !> Whether all disks are at rest. A disk bouncing inelastically on a surface at rest makes infinitely many bounces in a finite
+  !> time, because their durations form a convergent series. Under gravity, a disk counts as at rest if its last bounce was less
+  !> than `negligible_time` ago and its remaining bounces would end within `negligible_time`. Bounces lower than an eighth of the
+  !> spacing of the coordinates also count as rest, because rounding errors can make them endless. Without gravity, a disk is at
+  !> rest if it does not move.
   pure function is_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -280,6 +274,7 @@ contains
     long = sim%negligible_time
     yes = .true.
     do i = 1, sim%n_disks()
+      if (.not. sim%is_inside(i)) cycle
       if (sim%box%has_gravity()) then
         long = unresolved_bounce(sim, i)
         yes = sim%now - sim%disk(i)%clock <= long
@@ -289,5 +284,42 @@ contains
       if (.not. yes) return
     end do
   end function is_at_rest
+
+  !> The disk with the lowest id that rests on a side while other disks move; 0 if there is none. Its last event and its next bounce
+  !> on a dissipative side are both within `negligible_time` of the present. Its bounces are lower than the spacing of its
+  !> coordinates; therefore they converge, and time stops advancing.
+  pure function disk_on_side(sim) result(found)
+    type(simulation_t), intent(in) :: sim
+    integer(int32) :: found, i
+
+    found = 0
+    if (sim%law%contact_time > 0) return             ! bounces then become elastic, and do not converge
+    do i = 1, sim%n_disks()
+      if (.not. rests(i)) cycle
+      if (found > 0) then
+        if (sim%tag(found)%id < sim%tag(i)%id) cycle
+      end if
+      found = i
+    end do
+  contains
+
+    !> Whether disk i rests on a side, at least for the moment.
+    pure function rests(i) result(yes)
+      integer(int32), intent(in) :: i
+      logical :: yes
+
+      associate (disk => sim%disk(i), last => sim%negligible_time)
+        yes = sim%now - disk%clock <= last .and. disk%event_time - sim%now <= last .and. disk%partner <= 0
+        if (yes) yes = is_side(disk%partner)
+        if (.not. yes) return
+        associate (axis => axis_of(disk%partner), k => 1 - disk%partner)
+          associate (law => sim%box%surface(k)%law)
+            yes = sim%box%is_wall(k) .and. law%restitution < 1 .and. .not. law%temperature > 0 &
+              .and. abs(-sense_of(disk%partner)*disk%v(axis) - sim%box%side_velocity(k, sim%now)) <= last*magnitude(sim%box%gravity)
+          end associate
+        end associate
+      end associate
+    end function rests
+  end function disk_on_side
 
 end module epochs

@@ -1,49 +1,49 @@
-!> Event-driven dynamics: exact trajectories from event to event. Each disk stores one event, the earliest of its predicted events.
-!> When the stored event of a disk is due, the disks involved collide, and their next events are predicted.
+!> Event-driven dynamics: exact trajectories from event to event. Each disk stores the earliest of its predicted events. When this
+!> event is due, the disks involved collide, and their next events are predicted.
 !>
-!> The event of a disk becomes stale when its partner collides with a third disk before the event. The queue is not searched for
-!> stale events. A stale event is recognised by the collision counter of the partner when the event is due. Instead of the execution
-!> of a stale event, the next event of the disk is predicted.
+!> The event of a disk becomes stale if its partner collides with a third disk first. Stale events are not searched for: when such
+!> an event is due, the changed collision counter of the partner reveals it, and the next event of the disk is predicted instead.
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time
-  use collapses, only: watch
+  use collapses, only: still, watch
   use calendar, only: most_coming, stages
   use cell_grid, only: cell_grid_t
-  use encounters, only: collide, collide_pair, encounter_text, is_periodic_side, pass_side
+  use encounters, only: depart, encounter_text, execute_collision, is_passage, need_general, pass_side
   use epochs, only: begin_first_epoch, last_time
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use event_queue, only: event_queue_t
   use evolution, only: evolution_t, limits_t
   use neighbour_search, only: event_t
-  use partners, only: is_wall
+  use partners, only: axis_of, is_side, is_wall, nothing
   use piston_strips, only: change_strips, near_piston
-  use side_motion, only: piston
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
   use histories, only: histories_t
-  use boundary_collisions, only: collide_wall
   implicit none
   private
   public :: event_driven_t
 
   !> Largest number of events between two checks of the limits.
   integer(int64), parameter :: events_to_look = 20000
-  !> Largest number of disks that fit into a second-level cache. Prefetching saves time only if a simulation contains more disks
-  !> than fit into the cache.
+  !> Largest number of disks that fit into a second-level cache, up to which prefetching saves no time.
   integer(int32), parameter :: disks_in_cache = 20000
   integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 
+  !> Which disk-disk collisions need the general procedure: those of disks with equal clocks, those of disks that have hardly moved
+  !> relative to each other, or all.
+  integer, parameter :: if_clocks_are_equal = 0, if_hardly_moved = 1, always = 2
+
   type, extends(evolution_t) :: event_driven_t
-    !> The search for disks that can collide. The component is polymorphic, so that the compiler does not inline rarely used
-    !> procedures of the search into the hot path.
+    !> The search for disks that can collide; polymorphic, so that the compiler does not inline
+    !> rarely used procedures into the hot path.
     class(cell_grid_t), allocatable :: search
     type(event_queue_t) :: queue
     logical :: windowed = .true.                   !! whether the queue uses the calendar in addition to the heap
-    logical :: general = .false.                   !! whether collisions need the general procedure `collide`
+    integer :: general = if_clocks_are_equal       !! which collisions need the general procedure `collide`
     logical :: lossy = .false.                     !! whether collisions can be part of an inelastic collapse
-    logical :: special = .false.                   !! whether collisions are general or lossy
+    logical :: has_departed = .false.              !! whether a disk has left the box since the start of `advance`
     logical :: is_part = .false.  !! whether this engine advances a single domain of a parallel run
     class(histories_t), allocatable :: histories   !! records of the motion of disks in the domain
     integer(int64) :: last_count = 0               !! total number of events at which `run_events` returns
@@ -57,8 +57,8 @@ module event_driven
 
 contains
 
-  !> Sets up the search and the event queue for the state `sim`. The state is the initial state, a state from a checkpoint, or the
-  !> state at the start of an epoch.
+  !> Sets up the search and the event queue for the state `sim`: the initial state, that of a checkpoint, or that at the start of an
+  !> epoch.
   subroutine start(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -70,13 +70,14 @@ contains
     call self%search%build(sim)
     do i = 1, sim%n_disks()
       if (stop_requested()) return                 ! see `advance`
-      if (sim%tag(i)%id > 0) call self%search%predict(sim, i)    ! the id 0 marks an array element without a disk
+      if (sim%tag(i)%id == 0) cycle                ! an array element without a disk
+      if (sim%is_inside(i)) call self%search%predict(sim, i)
+      if (.not. sim%is_inside(i)) call forget_events(sim, i)
     end do
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
   end subroutine start
 
-  !> Predicts the events of the changed disks again. If another disk stores an event with one of the changed disks as the partner,
-  !> the stored event has become stale.
+  !> Predicts the events of changed disks anew. Events of other disks with a changed disk as partner become stale.
   subroutine renew(self, sim, changed)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -94,9 +95,8 @@ contains
     end do
   end subroutine renew
 
-  !> Predicts the events of all disks. The clocks of all disks must be equal. If the next kick changes all velocities, events after
-  !> that kick will never occur and are not entered into the queue. The earliest event is always entered, because the queue must not
-  !> be empty.
+  !> Predicts the events of all disks, whose clocks must be equal. If the next kick changes all velocities, later events will never
+  !> occur and are left out, except the earliest of all, because the queue must not be empty.
   subroutine renew_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -110,8 +110,10 @@ contains
     end do
     if (mod(n, 2_int32) == 1) call self%search%predict(sim, n)
     last = never
-    ! The time of the kick may be rounded up: see `timeline: advance_once`.
-    if (sim%drive%acts_on_all()) last = nearest(sim%drive%time_of(sim%kicks + 1) - sim%box%epoch, 1.0_real64)
+    ! The time of the kick may have been rounded up (see `timeline: advance_once`).
+    if (allocated(sim%drive)) then
+      if (sim%drive%acts_on_all()) last = nearest(sim%kick_time(sim%kicks + 1) - sim%box%epoch, 1.0_real64)
+    end if
     last = max(last, minval(sim%disk%event_time))
     do i = 1, n
       if (sim%disk(i)%event_time <= last) then
@@ -122,8 +124,8 @@ contains
     end do
   end subroutine renew_all
 
-  !> Executes events until a limit is reached. After a stop request the procedure returns early. After an early return, some
-  !> predictions may be missing, but the state of the simulation is complete.
+  !> Executes events until a limit is reached. After a stop request the procedure returns early: some predictions may then be
+  !> missing, but the state of the simulation is complete.
   subroutine advance(self, sim, limits, error, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -136,10 +138,11 @@ contains
 
     iterations = limits%iterations
     self%iterations_left = iterations
-    self%general = present(log) .or. sim%features%need_general_collision() .or. sim%law%by_speed%speed > 0
     self%lossy = sim%law%can_collapse()
-    self%special = self%general .or. self%lossy
+    self%general = merge(if_hardly_moved, if_clocks_are_equal, self%lossy)
+    if (present(log) .or. need_general(sim)) self%general = always
     self%arrived = .false.
+    self%has_departed = .false.
     do while (iterations > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return
       if (stop_requested()) return
@@ -150,9 +153,10 @@ contains
       call self%run_events(sim, t_limit, iterations, event, log)
       self%iterations_left = iterations
       self%last_event = [event%disk, event%partner]
-      ! All events at the time limit are executed before the procedure returns, because a sample may be due at the time limit.
+      ! All events at the time limit are executed, because a sample may be due then.
       if (iterations == 0 .and. .not. sim%now < limits%time) iterations = 1
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
+      if (self%has_departed) return                ! the caller asks the sources whether a disk enters
       if (event%time <= t_limit) cycle
       if (t_limit < limits%time .and. event%time > t_limit) then
         iterations = iterations + 1                ! an iteration without an event does not count
@@ -160,7 +164,7 @@ contains
         call follow_piston(self, sim)
         cycle
       end if
-      ! The returned event must not be stale, because a stale event depends on the order of the predictions.
+      ! The returned event must not be stale: which stale events exist depends on the order of the predictions.
       if (is_stale()) then
         call predict(self, sim, event%disk)
         cycle
@@ -176,7 +180,7 @@ contains
     end do
   contains
 
-    !> Whether the partner of the event has collided since the event was predicted.
+    !> Whether the partner has collided since the event was predicted.
     pure function is_stale() result(yes)
       logical :: yes
 
@@ -184,7 +188,7 @@ contains
       if (yes) yes = sim%disk(event%partner)%collision_counter /= sim%tag(event%disk)%partner_counter
     end function is_stale
 
-    !> The total number of executed events at which the next check of the limits is due.
+    !> Total number of executed events at which the limits are next checked.
     pure function next_pause() result(events)
       integer(int64) :: events
 
@@ -205,9 +209,8 @@ contains
     end subroutine read_ahead
   end subroutine advance
 
-  !> Hot path: executes one event after another. The loop ends when the number of events reaches `last_count`, when the next event
-  !> is later than the time limit, or when all allowed iterations have been used. Rarely needed operations are in the procedure that
-  !> calls `run_events`, and not in the loop itself.
+  !> Hot path: executes one event after another until the number of events reaches `last_count`, the next event is beyond the time
+  !> limit, or all allowed iterations are used up. Rare operations are left to the caller.
   subroutine run_events(self, sim, t_limit, iterations, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -240,23 +243,26 @@ contains
     real(real64), intent(in) :: t
     type(event_log_t), intent(inout), optional :: log
     logical :: counts, is_general
+    real(real64) :: s                              ! time since the later of the previous events of both disks [time]
 
     counts = .true.
     if (self%is_part) counts = self%histories%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%collision_counter == sim%tag(i)%partner_counter) then
-        ! The clocks of two disks are equal only if the disks are still in contact, or if both disks have collided at exactly the
-        ! present time. Collisions of two disks with equal clocks are rare and need the general procedure.
-        is_general = self%special .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0
-        if (is_general .and. self%lossy) then
-          call watch(sim, i, code, t, self%is_part)
-          is_general = self%general .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0
-        end if
-        if (is_general) then
-          call collide(sim, i, code, t, counts, log)
+        if (self%general == if_clocks_are_equal) then
+          ! The clocks of two disks are equal only if they are still in contact, or if both have collided at exactly the present
+          ! time.
+          is_general = .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0
+        else if (self%general == if_hardly_moved) then
+          ! One component of the displacement suffices, because `watch` tests both.
+          s = t - max(sim%disk(i)%clock, sim%disk(code)%clock)
+          is_general = (s*(sim%disk(code)%v(1) - sim%disk(i)%v(1)))**2 <= (still*(sim%disk(i)%radius + sim%disk(code)%radius))**2
+          if (is_general) call watch(sim, i, code, t, self%is_part)
         else
-          call collide_pair(sim, i, code, t, counts, sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species))
+          is_general = .true.
+          if (self%lossy) call watch(sim, i, code, t, self%is_part)
         end if
+        call execute_collision(sim, i, code, t, counts, is_general, log)
         call self%queue%drop_if_next(code)
         call self%search%predict_both(sim, i, code)
         if (self%is_part) call self%histories%record_collision(sim%disk, sim%tag, i, code)
@@ -264,15 +270,19 @@ contains
         call self%queue%schedule(sim%disk, sim%tag, i)
         return
       end if
-    else if (is_wall(code) .and. .not. is_periodic_side(sim, code)) then
-      if (self%general) then
-        call collide(sim, i, code, t, counts, log)
-      else
-        call collide_wall(sim, i, code, t, counts)
+    else if (is_wall(code) .and. .not. is_passage(sim, code)) then
+      call execute_collision(sim, i, code, t, counts, self%general == always, log)
+      if (is_side(code)) then
+        if (sim%box%side(1 - code)%is_piston()) call follow_side(self, sim, code)
       end if
-      if (sim%box%surface(sim%box%surface_of(code))%motion%kind == piston) call follow_side(self, sim, code)
     else
-      if (is_wall(code)) call pass_side(sim, i, code, t)
+      if (is_wall(code)) then
+        if (.not. sim%box%periodic(axis_of(code))) then
+          call let_out(self, sim, i, code, t, log)
+          return
+        end if
+        call pass_side(sim, i, code, t)
+      end if
       call self%search%cross(sim, i, code)
       if (self%is_part) call self%histories%record_cell(sim%tag(i)%cell, i)
       call self%queue%schedule(sim%disk, sim%tag, i)
@@ -281,9 +291,40 @@ contains
     call predict(self, sim, i)
   end subroutine execute
 
-  !> Updates predicted events after a collision has changed the motion of a piston. Events are predicted again for disks whose next
-  !> event was a collision with the piston, and for disks that now reach the piston before their next event. The event loop returns
-  !> after a collision with a piston, because the piston may leave its strip of cells (see `piston_strips`) earlier than expected.
+  !> Lets disk i leave the box through an open side. The event loop then returns.
+  subroutine let_out(self, sim, i, code, t, log)
+    class(event_driven_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, code          !! index of the disk, and code of the side: see `partners`
+    real(real64), intent(in) :: t
+    type(event_log_t), intent(inout), optional :: log
+
+    self%has_departed = .true.
+    self%last_count = 0
+    call depart(sim, i, code, t, log)
+    if (sim%disk(i)%radius > self%search%patch%small) then
+      call self%start(sim)                         ! the lists of big disks are made anew
+    else
+      call self%search%take_out(sim%tag(i), i)
+      self%search%n_listed = self%search%n_listed - 1
+      sim%tag(i)%cell = 0
+      call forget_events(sim, i)
+      call self%queue%schedule(sim%disk, sim%tag, i)
+    end if
+  end subroutine let_out
+
+  !> Sets the next event of a waiting disk to a time that is never reached.
+  pure subroutine forget_events(sim, i)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+
+    sim%disk(i)%event_time = 2*never
+    sim%disk(i)%partner = nothing
+  end subroutine forget_events
+
+  !> Updates predicted events after a collision has changed the motion of a piston: those of disks whose next event was a collision
+  !> with the piston, and of disks that it now reaches before their next event. The event loop returns afterwards, because the
+  !> piston may leave its strip of cells (see `piston_strips`) earlier than expected.
   subroutine follow_side(self, sim, side)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -301,8 +342,8 @@ contains
     end associate
   end subroutine follow_side
 
-  !> When a piston leaves its strip (the cells that the piston can reach soon, see `piston_strips`), predicts the events of the
-  !> disks in the old strip and in the new strip again.
+  !> When a piston leaves its strip (the cells within its reach, see `piston_strips`), predicts the events of the disks in the old
+  !> and the new strip anew.
   subroutine follow_piston(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -325,8 +366,7 @@ contains
     call self%queue%schedule(sim%disk, sim%tag, i)
   end subroutine predict
 
-  !> Predicts the events of all disks, and not only of the disks that have collided. A prediction for all disks after each event is
-  !> the simplest algorithm in textbooks.
+  !> Predicts the events of all disks after each event, not only of those involved: the simplest textbook algorithm.
   subroutine predict_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -334,7 +374,7 @@ contains
 
     do i = 1, sim%n_disks()
       if (stop_requested()) return                 ! see `advance`
-      call predict(self, sim, i)
+      if (sim%is_inside(i)) call predict(self, sim, i)
     end do
   end subroutine predict_all
 

@@ -1,6 +1,6 @@
-!> A priority queue of events: a min-heap in an array, with four children per node. The queue contains at most one event per disk,
-!> and this event can be found by the index of the disk. The order of simultaneous events depends neither on the order of insertion
-!> nor on which of the two disks stores an event.
+!> A priority queue of events: a min-heap in an array, with four children per node. It holds at most
+!> one event per disk, found by the index of the disk. The order of simultaneous events depends
+!> neither on the order of insertion nor on which of the two disks stores an event.
 module event_heap
   use kinds, only: int32
   use disks, only: tag_t
@@ -9,14 +9,15 @@ module event_heap
   private
   public :: event_heap_t, need_order, precedes
 
-  !> Number of children of a node. A heap with four children per node has half as many levels as a binary heap, and each level needs
-  !> no more accesses to cache lines than a level of a binary heap.
+  !> Number of children of a node. Compared with a binary heap, a heap with four children has half
+  !> as many levels, without needing more cache lines per level.
   integer(int32), parameter :: arity = 4
 
   type :: event_heap_t
     integer(int32) :: n = 0                      !! number of events
     type(event_t), allocatable, private :: entry(:)        !! (n) events in heap order
-    !> (disks) position in `entry` of the event of each disk; 0 if the heap contains no event of the disk.
+    !> (disks) position in `entry` of the event of each disk; 0 if the heap contains no event of the
+    !> disk
     integer(int32), allocatable, private :: slot(:)
   contains
     procedure :: initialise
@@ -27,8 +28,9 @@ module event_heap
 
 contains
 
-  !> Whether event a precedes event b. Events are ordered by time, and simultaneous events are ordered by `neighbour_search: wins`.
-  !> If both disks of a pair store their collision, the two stored events have the same position in the order.
+  !> Whether event a precedes event b: events are ordered by time, and simultaneous events by
+  !> `neighbour_search: wins`. If both disks of a pair have stored their collision, the two events
+  !> have the same rank.
   pure function precedes(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
     type(tag_t), intent(in) :: tag(*)
@@ -38,9 +40,9 @@ contains
     if (.not. (yes .or. a%time > b%time)) yes = wins(a, b, tag)
   end function precedes
 
-  !> Nonzero if the function `precedes` has to determine the order of events a and b, because they are different events at the same
-  !> time. The caller ensures that event a is not earlier than event b. Two events at the same time are usually the two copies of
-  !> one collision, which both disks store, and the order of the two copies has no effect.
+  !> Nonzero if `precedes` has to order the simultaneous events a and b; a must not be earlier than
+  !> b. Usually they are the two copies of one collision, stored by both disks, whose order does not
+  !> matter.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits
@@ -97,8 +99,8 @@ contains
     if (self%n > 0) call sift_down(self, 1_int32, last, tag)
   end subroutine drop_first
 
-  !> Inserts `event` at the position `start`, and moves the event towards the root of the heap until the parent node precedes the
-  !> event.
+  !> Inserts `event` at the position `start`, and moves it towards the root of the heap until its
+  !> parent precedes it.
   pure subroutine sift_up(self, start, event, tag)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: start
@@ -118,8 +120,8 @@ contains
     self%slot(event%disk) = k
   end subroutine sift_up
 
-  !> Inserts `event` at the position `start`, and moves the event away from the root of the heap until the event precedes all child
-  !> nodes.
+  !> Inserts `event` at the position `start`, and moves it away from the root of the heap until it
+  !> precedes all its children.
   pure subroutine sift_down(self, start, event, tag)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: start

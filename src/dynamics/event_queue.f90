@@ -1,9 +1,9 @@
 !> The event queue: a calendar combined with a heap (Paul, Journal of Computational Physics 221, 615 (2007)).
 !>
-!> Events of the current time window are in a short sorted list. If the sorted list becomes full, its events are moved to the heap,
-!> and the heap is used until the end of the window. Events of later windows are in the calendar, or in the heap if their bucket is
-!> full. No procedure searches the lists of the calendar for the entry of a particular disk, or removes a single entry. An entry is
-!> valid only if the entry still equals the event that its disk stores. Without the calendar all events are in the heap.
+!> Events of the current time window are kept in a short sorted list. If it overflows, they move to the heap, which is then used
+!> until the end of the window. Events of later windows are stored in the calendar, or in the heap if their bucket is full. Entries
+!> in the calendar are never searched for or removed individually; an entry is valid as long as it equals the event stored by its
+!> disk. Without the calendar, all events are in the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none
@@ -22,10 +22,10 @@ module event_queue
     private
     type(calendar_t) :: calendar
     type(event_heap_t) :: heap
-    !> (0:n_near) sorted list of events, the latest first; element 0 is a sentinel that is never due.
+    !> (0:n_near) sorted list of events, the latest first; element 0 is a sentinel that is never due
     type(event_t) :: near(0:near_capacity)
     integer(int32) :: n_near = 0
-    !> .true. if new events of the current window are added to the sorted list, .false. if they are added to the heap
+    !> .true. if new events of the current window go to the sorted list, .false. if they go to the heap
     logical :: near_is_open = .false.
     logical :: windowed = .true.                   !! whether the calendar is used in addition to the heap
     integer(int32) :: window = 0                   !! index of the current window, counted from the time origin `box%epoch`
@@ -43,8 +43,7 @@ module event_queue
     procedure :: drop_first
     procedure :: drop_if_next
     procedure :: list_coming
-    ! Rarely called procedures are type-bound, so that the compiler does not inline these procedures into frequently called
-    ! procedures.
+    ! Rarely called procedures are type-bound, which prevents the compiler from inlining them into frequently called ones.
     procedure, private :: insert_near
     procedure, private :: insert_into_heap
     procedure, private :: first_in_heap
@@ -88,9 +87,8 @@ contains
     end do
   contains
 
-    !> Width of a window that contains `events_per_window` events on average, from the event rate since the last call of `fill`. The
-    !> first estimate of the width uses the median waiting time of a sample of disks. If there are no events, the width is set to
-    !> the constant `never`.
+    !> Width of a window with `events_per_window` events on average, from the event rate since the last call of `fill`; at first,
+    !> from the median waiting time in a sample of disks. Without events the width is `never`.
     pure function window_width() result(width)
       real(real64) :: width, waits(sample_size), swap
       integer :: i, k, n_waits
@@ -115,8 +113,8 @@ contains
     end function window_width
   end subroutine fill
 
-  !> Enters the event of disk i into the queue. A previous entry of the disk becomes invalid, because the entry no longer equals the
-  !> event of the disk.
+  !> Enters the event of disk i into the queue. A previous entry of the disk becomes invalid, because it no longer equals the stored
+  !> event.
   subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -127,7 +125,7 @@ contains
     logical :: full
 
     number = disk(i)%event_time*self%per_time
-    if (.not. number >= self%next_window) then     ! NaN also fulfils the condition, so that the error is detected
+    if (.not. number >= self%next_window) then     ! true for NaN too, so that the error is detected
       tag(i)%window = window_none
       call self%insert_near(disk, tag, i)
       return
@@ -145,8 +143,8 @@ contains
     end if
   end subroutine schedule
 
-  !> Removes the entry of a disk from the queue. The procedure only erases the window number in the tag of the disk. The entry of
-  !> the disk remains stored, but becomes invalid when the event of the disk changes.
+  !> Removes the entry of a disk from the queue by erasing the window number in its tag. The entry itself stays in memory, and
+  !> becomes invalid when the event of the disk changes.
   pure subroutine remove_entry(self, tag)
     class(event_queue_t), intent(in) :: self
     type(tag_t), intent(inout) :: tag
@@ -154,7 +152,7 @@ contains
     tag%window = window_none
   end subroutine remove_entry
 
-  !> Adds an event of the current window to the sorted list, or to the heap if the list has become full.
+  !> Adds an event of the current window to the sorted list, or to the heap if the list is full.
   subroutine insert_near(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -194,9 +192,8 @@ contains
     call self%heap%update(event_of(disk, i), tag)
   end subroutine insert_into_heap
 
-  !> Inserts an event into a sorted list of n events. The comparison of the times nearly always suffices to order two events. Two
-  !> events at the same time are usually the two copies of one collision, which both disks store, and the order of the two copies
-  !> has no effect.
+  !> Inserts an event into a sorted list of n events. Comparing the times is nearly always sufficient: simultaneous events are
+  !> usually the two copies of one collision, stored by both disks, whose order does not matter.
   pure subroutine insert(list, n, event, tag)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n
@@ -239,7 +236,7 @@ contains
     end do
   end subroutine first
 
-  !> The disk with the earliest event in the heap; 0 if no event in the heap is due in the current window.
+  !> Disk with the earliest event in the heap; 0 if none is due in the current window.
   subroutine first_in_heap(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -272,9 +269,8 @@ contains
     self%n_taken = self%n_taken + 1
   end subroutine drop_first
 
-  !> Removes the next entry of the queue if this entry belongs to disk i. If both disks of a collision have stored the collision,
-  !> the two entries are adjacent. The removal of the second entry of a collision saves time but is not necessary, because the entry
-  !> would later be recognised as invalid.
+  !> Removes the next entry of the queue if it belongs to disk i. If both disks of a collision have stored it, the two entries are
+  !> adjacent; removing the second one at once saves the time of recognising it as invalid later.
   subroutine drop_if_next(self, i)
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -282,7 +278,7 @@ contains
     self%n_near = self%n_near - merge(1, 0, self%near(self%n_near)%disk == i)
   end subroutine drop_if_next
 
-  !> Lists disks that probably have events in the next windows: see `calendar`.
+  !> Lists disks that probably have events in the next windows (see `calendar`).
   subroutine list_coming(self, tag, stage, n, disks)
     class(event_queue_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
@@ -294,7 +290,7 @@ contains
     if (self%windowed) call self%calendar%list_coming(tag, self%window, stage, n, disks)
   end subroutine list_coming
 
-  !> Whether an entry is valid, which means that the entry equals the event that its disk stores.
+  !> Whether an entry is valid: equal to the event stored by its disk.
   pure function is_valid(disk, event) result(yes)
     type(disk_t), intent(in) :: disk(*)
     type(event_t), intent(in) :: event
@@ -305,7 +301,7 @@ contains
     end associate
   end function is_valid
 
-  !> Advances by one window and sorts the events of the new window into the list, which must be empty.
+  !> Advances by one window and sorts its events into the list, which must be empty.
   subroutine open_next_window(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -320,9 +316,9 @@ contains
     if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
-  !> Moves the valid events in a bucket to a sorted list. An entry in the bucket is invalid if the event that its disk stores is due
-  !> in a later window. The position of each event in the sorted list is found by counting the later events. Counting is fast,
-  !> because a bucket contains few events and no branch depends on their times.
+  !> Moves the valid events of a bucket to a sorted list; an entry is invalid if the event stored by its disk is due in a later
+  !> window. The position of each event in the list is the number of later events, counted without branches that depend on the
+  !> times, which is fast for the few events of a bucket.
   pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)
@@ -362,8 +358,8 @@ contains
     end do
   end subroutine take_bucket
 
-  !> Moves the events that are due in the current window from the heap to the sorted list. If the sorted list overflows, all events
-  !> in the list are moved back into the heap.
+  !> Moves the events that are due in the current window from the heap to the sorted list. If the
+  !> list overflows, all of its events are moved back.
   subroutine take_from_heap(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -379,8 +375,8 @@ contains
     call hand_over(self, disk, tag)
   end subroutine take_from_heap
 
-  !> Moves the events of the next span into their buckets. If the width of the windows has proved far too small or too large, all
-  !> events are entered into the queue again with a new width.
+  !> Moves the events of the next span into their buckets. If windows have proved far too narrow or too wide, all events are entered
+  !> anew with another width.
   subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -400,8 +396,8 @@ contains
     end do
   contains
 
-    !> Whether all events should be entered into the queue again, with another width of the windows. The condition is that the
-    !> present width has proved far too small or too large, and that enough windows have passed since the last call of `fill`.
+    !> Whether all events should be entered anew with another width of the windows: the present width has proved far too small or
+    !> too large, and enough windows have passed since the last call of `fill`.
     pure function ill_fitting() result(yes)
       logical :: yes
       real(real64) :: per_window

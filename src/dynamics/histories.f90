@@ -1,7 +1,7 @@
-!> Records the motion of disks in one domain during the present time window of a parallel run. The record of a disk, called its
-!> history, consists of the range of cells in which the disk was and a digest (hash) of its collisions. After the window, the
-!> histories show whether each copy of a disk has moved in the same way as the original disk in the domain that owns this disk. The
-!> module also determines which collisions a domain counts.
+!> Records the motion of the disks in one domain during the present time window of a parallel run.
+!> The history of a disk consists of the range of cells that it visited and a digest (hash) of its
+!> collisions. After the window, histories show whether each ghost has moved in the same way as its
+!> original in the domain that owns it. The module also determines which domain counts a collision.
 module histories
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int16, int32, int64, real64
@@ -12,12 +12,12 @@ module histories
   private
   public :: history_t, histories_t
 
-  !> The history of a disk in the present window. A disk has no history if the domain owns the disk and no other domain can have a
-  !> copy of the disk.
+  !> History of a disk in the present window. A disk owned by the domain needs none if it cannot be
+  !> a ghost in another domain.
   type :: history_t
     integer(int64) :: digest = 0                   !! digest of the times of the collisions of this disk with other disks
     integer(int32) :: slot = 0
-    logical :: own = .false.                       !! whether this domain owns the disk; .false. for a copy of a disk
+    logical :: own = .false.                       !! whether this domain owns the disk; .false. for a ghost
     integer(int16) :: low(2) = 0_int16             !! lowest column and lowest row in which the disk was
     integer(int16) :: high(2) = 0_int16            !! highest column and highest row in which the disk was
   end type history_t
@@ -28,13 +28,13 @@ module histories
     type(history_t), allocatable :: history(:)     !! (at least n_histories) histories of disks
     integer(int32), allocatable :: history_of(:)   !! (slots) index of the history of each disk; 0 for a disk without a history
     integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! first and last column and row of the domain
-    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! columns and rows that no other patch contains
-    !> Range of columns and rows of the cells whose eight neighbours are all in the patch.
+    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! columns and rows that belong to no other extended domain
+    !> Range of columns and rows of the cells whose eight neighbours are all in the extended domain.
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0
-    !> (0:,0:) 1 for each cell outside of the domain that a disk of the domain has reached, and for the eight neighbours of such a
-    !> cell; 0 for all other cells.
+    !> (0:,0:) 1 for each cell outside the domain that a disk of the domain has reached, and for the
+    !> eight neighbours of such a cell; 0 elsewhere
     integer(int8), allocatable :: reached(:, :)
-    logical :: left_patch = .false.                !! whether a disk that the domain owns has reached the edge of the patch
+    logical :: left_patch = .false.                !! whether an owned disk has reached the edge of the extended domain
   contains
     procedure :: record_collision
     procedure :: record_cell
@@ -46,13 +46,13 @@ module histories
     procedure :: could_have_met
     procedure :: owns
     procedure :: is_own
-    procedure :: n_copies
+    procedure :: n_ghosts
     procedure, private :: add_history
   end type histories_t
 
 contains
 
-  !> Starts a new window. At the start of a window, no disk that the domain owns has left the domain.
+  !> Starts a new window, at the start of which no owned disk has left the domain.
   subroutine begin_window(self)
     class(histories_t), intent(inout) :: self
 
@@ -60,8 +60,8 @@ contains
     self%left_patch = .false.
   end subroutine begin_window
 
-  !> Starts a new history of disk i if another domain can have a copy of a disk in the present cell. The domain owns disk i if the
-  !> present cell of the disk is in the domain.
+  !> Starts a new history of disk i if the disk can be a ghost in another domain while it is in its
+  !> present cell. The domain owns the disk if this cell is in the domain.
   subroutine begin_history(self, cell, i)
     class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -75,7 +75,7 @@ contains
     end if
   end subroutine begin_history
 
-  !> Assigns a history to disk i. The caller sets the content of the history.
+  !> Assigns a history to disk i, whose content the caller sets.
   subroutine add_history(self, i)
     class(histories_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -85,7 +85,8 @@ contains
     self%history_of(i) = self%n_histories
   end subroutine add_history
 
-  !> Deletes the history of disk i if disk i has a history. The last history in the array moves to the index of the deleted history.
+  !> Deletes the history of disk i, if it has one, by moving the last history in the array to its
+  !> place.
   subroutine drop_history(self, i)
     class(histories_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -101,8 +102,8 @@ contains
     self%n_histories = self%n_histories - 1
   end subroutine drop_history
 
-  !> Whether this domain counts a collision of disk i. A collision of two disks is counted by the domain that owns the disk with the
-  !> lower id; any other collision is counted by the domain that owns disk i.
+  !> Whether this domain counts a collision of disk i. Collisions of two disks are counted by the
+  !> owner of the disk with the lower id, all other collisions by the owner of disk i.
   pure function counts(self, tag, i, code) result(yes)
     class(histories_t), intent(in) :: self
     type(tag_t), intent(in) :: tag(:)
@@ -159,7 +160,7 @@ contains
 
     if (self%history_of(i) == 0) then
       if (within(cell, self%deep_low, self%deep_high)) return
-      call self%add_history(i)                     ! the cell is also in the patch of another domain
+      call self%add_history(i)                     ! the cell also belongs to another extended domain
       self%history(self%history_of(i)) = history_t(0_int64, i, .true., cell, cell)
     end if
     associate (history => self%history(self%history_of(i)))
@@ -169,8 +170,8 @@ contains
     end associate
   end subroutine record_cell
 
-  !> Records that a disk that the domain owns is in a cell outside of the domain. A disk in a cell can touch any disk in the cell
-  !> and in the eight neighbouring cells.
+  !> Records that an owned disk is in a cell outside the domain, where it can touch any disk in the
+  !> 3 x 3 cells around it.
   subroutine reach(self, cell)
     class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -217,16 +218,16 @@ contains
     if (.not. yes) yes = self%history(self%history_of(i))%own
   end function is_own
 
-  !> Number of histories that belong to copies of disks.
-  pure function n_copies(self) result(n)
+  !> Number of histories that belong to ghosts.
+  pure function n_ghosts(self) result(n)
     class(histories_t), intent(in) :: self
     integer(int32) :: n
 
     n = count(.not. self%history(:self%n_histories)%own, kind=int32)
-  end function n_copies
+  end function n_ghosts
 
-  !> Whether a disk that was in the given range of columns and rows during the window could have touched a disk that the domain
-  !> owns.
+  !> Whether a disk that was in the given range of columns and rows during the window could have
+  !> touched an owned disk.
   pure function could_have_met(self, low, high) result(yes)
     class(histories_t), intent(in) :: self
     integer(int32), intent(in) :: low(2), high(2)

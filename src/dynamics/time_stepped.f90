@@ -1,16 +1,15 @@
-!> Time-stepped dynamics: in each step of fixed length, all disks first move in exact free flight. After the free flight each disk
-!> beyond a wall is reflected, and each pair of disks that overlap and approach each other collides once. A contact is detected up
-!> to one step late, and a contact that begins and ends within a step is not detected. The method serves for comparisons with
-!> event-driven dynamics.
+!> Time-stepped dynamics. In each step of fixed length all disks first move in exact free flight; then each disk beyond a wall is
+!> reflected, and each overlapping, approaching pair collides once. A contact is detected up to one step late, and missed if it
+!> begins and ends within a step. The method exists for comparison with event-driven dynamics.
 !>
-!> As in event-driven dynamics, the stored state of a disk changes only in collisions of the disk, so that rounding errors do not
-!> accumulate from step to step.
+!> As in event-driven dynamics, the stored state of a disk changes only in its collisions, so that rounding errors do not accumulate
+!> from step to step.
 module time_stepped
   use images, only: images_t
   use kinds, only: int32, int64, largest_exact, never, real64
   use box_geometry, only: normal_surface_velocity, wall_normal
   use box_sides, only: bounds
-  use encounters, only: collide, encounter_text, is_periodic_side, pass_side
+  use encounters, only: collide, depart, encounter_text, is_passage, pass_side
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
@@ -30,7 +29,7 @@ module time_stepped
 
   type, extends(evolution_t) :: time_stepped_t
     real(real64) :: dt = 0.0_real64                 !! [time]
-    !> Whether all pairs are tested in every step, and not only the pairs in the Verlet lists.
+    !> Whether all pairs are tested in every step, instead of only those in the Verlet lists.
     logical :: every_pair = .false.
     type(verlet_list_t), private :: near
     ! The coordinates are stored separately from the disks, so that loops can be vectorised.
@@ -61,7 +60,7 @@ contains
     self%idle = .false.
   end subroutine start
 
-  !> The end of the time step that contains a given time.
+  !> End of the time step that contains a given time.
   pure function pause_at(self, time) result(t)
     class(time_stepped_t), intent(in) :: self
     real(real64), intent(in) :: time               !! time since the start of the run
@@ -73,8 +72,8 @@ contains
     if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
   end function pause_at
 
-  !> Prepares the dynamics to continue after the velocities of disks have been changed. Only the test for rest is reset, because
-  !> Verlet lists do not depend on velocities.
+  !> Prepares the dynamics to continue after velocities have been changed. Only the test for rest is reset: Verlet lists do not
+  !> depend on velocities.
   subroutine renew(self, sim, changed)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -83,16 +82,16 @@ contains
     self%idle = .false.
   end subroutine renew
 
-  !> Executes steps. The k-th step ends at the time k*dt. The end of a step does not depend on the times at which earlier calls of
-  !> `advance` have returned.
+  !> Executes steps, the k-th of which ends at the time k*dt, independently of when earlier calls of `advance` returned.
   subroutine advance(self, sim, limits, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
-    integer(int64) :: k
+    integer(int64) :: k, departures
 
+    departures = sum(sim%tally%left)
     self%arrived = .not. sim%now < limits%time      ! all limits are tested at the end of a step
     self%iterations_left = limits%iterations
     k = steps_taken(sim%now, self%dt)
@@ -109,11 +108,11 @@ contains
       if (allocated(error) .or. sim%now < k*self%dt) return
       self%iterations_left = self%iterations_left - 1
       self%arrived = .not. sim%now < limits%time
+      if (sum(sim%tally%left) > departures) return   ! the caller asks the sources whether a disk enters
     end do
   end subroutine advance
 
-  !> Number of steps before the present time: the largest integer k with k*dt <= now. The number of steps depends on the present
-  !> time and the length of a step alone.
+  !> Number of steps before the present time: the largest integer k with k*dt <= now.
   pure function steps_taken(now, dt) result(k)
     real(real64), intent(in) :: now, dt             !! [time]
     integer(int64) :: k
@@ -124,23 +123,23 @@ contains
     end do
   end function steps_taken
 
-  !> Whether all disks are at rest, and no force or side can set a disk in motion.
+  !> Whether all disks are at rest, with no force or side that could set them in motion.
   pure function at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
     integer(int32) :: i
 
-    yes = .not. (sim%box%has_gravity() .or. any(sim%box%surface%motion%moves()))
+    yes = .not. (sim%box%has_gravity() .or. any(sim%box%side%moves()))
     do i = 1, sim%n_disks()
       if (.not. yes) return
       yes = .not. any(abs(sim%disk(i)%v) > slowest)
     end do
   end function at_rest
 
-  !> Advances all disks to the time t and executes all collisions at this time. Collisions with sides come first, then collisions
-  !> with obstacles, then collisions of two disks. Collisions of the same kind are executed in ascending order of the indices, so
-  !> that the result does not depend on the search for pairs. If a stop is requested during a long search for pairs, the procedure
-  !> returns early, and the state is then still unchanged.
+  !> Advances all disks to the time t and executes all collisions that are due then. Collisions with sides precede those with
+  !> obstacles, and these precede collisions of two disks. Within each group the order is that of the disk indices, so the result
+  !> does not depend on the method of the search for pairs. If the program is asked to stop during a long search, the procedure
+  !> returns early and leaves the state unchanged.
   subroutine take_step(self, sim, t, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -155,6 +154,9 @@ contains
         self%x(i, 2) = flight(d%x(2), d%v(2), g(2), t - d%clock)
       end associate
     end do
+    do i = 1, merge(sim%n_disks(), 0_int32, allocated(sim%waits))
+      if (.not. sim%is_inside(i)) self%x(i, :) = sim%disk(i)%x       ! gravity does not act on waiting disks
+    end do
     call self%near%update(sim, self%x, self%dt, self%every_pair)
     if (self%every_pair) then
       if (stop_requested()) return
@@ -167,7 +169,7 @@ contains
         call fail(error, exit_broken, "a position became NaN: "//encounter_text(sim, i, nothing))
         return
       end if
-      call meet_sides()
+      if (sim%is_inside(i)) call meet_sides()
       i = next_marked(self%outside, i)
     end do
     call self%near%mark_overlaps(sim%box, self%x, self%radius)
@@ -184,7 +186,7 @@ contains
     end do
   contains
 
-    !> Moves disk i through the periodic sides that it has passed, and reflects it at walls.
+    !> Moves disk i through the periodic sides that it has passed, reflects it at walls, and lets it leave through open sides.
     subroutine meet_sides()
       real(real64) :: beyond, inset, before(2), low(2), high(2)
       integer(int32) :: side
@@ -193,14 +195,18 @@ contains
       call bounds(sim%box, sim%now, low, high)
       do side = 0, 1 - n_sides, -1
         axis = axis_of(side)
-        inset = merge(0.0_real64, sim%disk(i)%radius, sim%box%periodic(axis))
+        inset = merge(0.0_real64, sim%disk(i)%radius, is_passage(sim, side))
         if (sense_of(side) < 0) then
           beyond = (low(axis) + inset) - self%x(i, axis)
         else
           beyond = self%x(i, axis) - (high(axis) - inset)
         end if
         if (.not. beyond > 0) cycle
-        if (is_periodic_side(sim, side)) then
+        if (sim%box%open(1 - side)) then
+          call depart(sim, i, side, sim%now, log)
+          call self%near%remove(i)
+          return
+        else if (sim%box%periodic(axis)) then
           before = self%x(i, :)
           call pass_side(sim, i, side, sim%now)
           self%x(i, :) = sim%position(i)
@@ -211,8 +217,8 @@ contains
       end do
     end subroutine meet_sides
 
-    !> Reflects disk i, which overlaps a wall (a side or an obstacle), if the disk moves further into the wall. The position of the
-    !> disk is not changed, so that its potential energy is conserved.
+    !> Reflects disk i, which overlaps a wall (a side or an obstacle), if it is moving further into it. Position and potential
+    !> energy do not change.
     subroutine meet_wall(i, code)
       integer(int32), intent(in) :: i, code
       real(real64) :: normal(2)
@@ -222,7 +228,7 @@ contains
         call collide(sim, i, code, sim%now, .true., log)
     end subroutine meet_wall
 
-    !> Executes the collision of the overlapping disks i and j (i < j), if the disks approach each other.
+    !> Executes the collision of the overlapping disks i and j (i < j), if they approach each other.
     subroutine meet_disk(i, j)
       integer(int32), intent(in) :: i, j
       type(images_t) :: images
@@ -235,7 +241,7 @@ contains
     end subroutine meet_disk
   end subroutine take_step
 
-  !> The first position after `after` at which the array contains 1; 0 if there is no such position.
+  !> First position after `after` at which the array contains 1; 0 if there is none.
   pure function next_marked(mark, after) result(k)
     integer(int32), contiguous, intent(in) :: mark(:)
     integer(int32), intent(in) :: after
@@ -247,7 +253,7 @@ contains
     k = 0
   end function next_marked
 
-  !> Sets `outside` to 1 for disks that are not between the sides or whose position is NaN, and to 0 for all other disks.
+  !> Sets `outside` to 1 for disks that are not between the sides or have a NaN position, and to 0 for all others.
   pure subroutine mark_outside(self, sim)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -273,9 +279,9 @@ contains
     inside = iand(merge(1, 0, x >= low), merge(1, 0, x <= high))
   end function between
 
-  !> A warning about the length of the step; empty if the length is suitable. For the estimate of the largest speed under gravity,
-  !> v0 + sqrt(2 g L), the fastest disk is assumed to fall through the whole box of length L. A disk that dissipates energy in every
-  !> step of a lasting contact sinks by up to g dt**2/2 per step under gravity; the TC model prevents the sinking.
+  !> Warning about the length of the step; empty if it is suitable. The largest speed under gravity is estimated as v0 + sqrt(2 g
+  !> L), for the fastest disk falling through the whole box of length L. Without the TC model, a disk under gravity that dissipates
+  !> energy in every step of a lasting contact sinks by up to g dt**2/2 per step.
   pure function warning(self, sim) result(text)
     class(time_stepped_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -1,31 +1,31 @@
-!> Executes the actions that affect all disks at once, in a fixed order. At equal times collisions are executed first, then kicks,
-!> then the actions of the caller (samples, end of the run). The time origin moves at the end of an epoch, when no other action is
-!> in progress.
+!> Executes the actions that affect all disks at once, in a fixed order. At equal times, collisions come first, then scheduled
+!> changes, entries of disks, kicks, and finally the actions of the caller (samples, end of the run). The time origin moves at the
+!> end of an epoch, when no other action is in progress.
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal
-  use epochs, only: are_crushed, ends_by_event, ends_by_kick, has_come_to_rest, is_at_rest, last_time, most_events, move_epoch
-  use epochs, only: stands_still
+  use changes, only: make_scheduled_change
+  use entries, only: entry_time, let_disks_enter
+  use epochs, only: are_crushed, disk_on_side, ends_by_event, ends_by_kick, has_come_to_rest, is_at_rest, last_time, most_events
+  use epochs, only: move_epoch, stands_still
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
-  use kicks, only: kick
   use kinds, only: int32, int64, never, real64
   use partners, only: is_side, obstacle_number
-  use recycling, only: are_waiting, recycle_disks
   use shapes, only: magnitude
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
   use texts, only: about, counted, written
   implicit none
   private
-  public :: adapted_iterations, advance, advance_once, next_kick, collapse_note, report_rest
+  public :: adapted_iterations, advance, advance_once, next_action, collapse_note, report_rest
 
   real(real64), parameter :: pause_interval = 0.05_real64  !! intended time between two checks of signals and of the wall clock [s]
 
 contains
 
-  !> Advances the simulation until a limit is reached, or until no event will occur any more.
+  !> Advances the simulation until a limit is reached, or until no further event can occur.
   subroutine advance(evolution, sim, limits, error, log)
     class(evolution_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -40,9 +40,8 @@ contains
     end do
   end subroutine advance
 
-  !> Advances the simulation until a limit is reached, a kick is due, or the epoch ends. If a kick is due or the epoch has ended,
-  !> the procedure executes the kick or starts the next epoch. The trajectory does not depend on the times at which the procedure
-  !> returns.
+  !> Advances the simulation until a limit is reached, a change, an entry or a kick is due, a disk leaves the box, or the epoch
+  !> ends. Then executes the due action, or starts the next epoch. The trajectory does not depend on when the procedure returns.
   subroutine advance_once(evolution, sim, limits, error, log)
     class(evolution_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -50,15 +49,16 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
     type(limits_t) :: goal
-    real(real64) :: due, until, kick_time, before  ! [time]
+    real(real64) :: due, until, source_time, kick_time, before     ! [time]
     integer(int64) :: events
     integer(int32), allocatable :: kicked(:)
-    logical :: arrived, epoch_is_over, by_event
+    logical :: arrived, changed, epoch_is_over, by_event
 
     events = sim%tally%events
     before = sim%time()
+    source_time = next_entry(evolution, sim)
     kick_time = next_kick(evolution, sim)
-    due = min(limits%time, kick_time)
+    due = min(limits%time, next_action(evolution, sim))
     goal = limits
     until = due - sim%box%epoch
     if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)   ! rounding up ensures that `due` is reached
@@ -82,26 +82,38 @@ contains
       end if
       if (epoch_is_over) call end_epoch()
     end if
-    do while (arrived .and. sim%time() >= kick_time .and. next_kick(evolution, sim) <= kick_time)
-      if (sim%drive%moves_disks()) then
-        call recycle_disks(sim, kicked)
-      else
-        call kick(sim, kicked)
-      end if
-      if (ends_by_kick(sim, kicked)) then
-        call move_epoch(sim, .true.)
-        call evolution%start(sim)
-      else if (.not. sim%drive%moves_disks()) then
-        call evolution%renew(sim, kicked)
-      else if (size(kicked) > 0) then
-        call evolution%start(sim)
-      end if
+    changed = .false.
+    if (arrived) call make_changes(evolution, sim, changed, error)
+    arrived = arrived .and. .not. changed
+    do while (arrived .and. sim%time() >= source_time .and. next_entry(evolution, sim) <= source_time)
+      call let_disks_enter(sim, next_source(evolution, sim), kicked)
+      call continue_with(kicked, .true.)
     end do
-    sim%events_done = arrived .or. (sim%events_done .and. sim%tally%events == events .and. .not. sim%time() > before)
+    do while (arrived .and. sim%time() >= kick_time .and. next_kick(evolution, sim) <= kick_time)
+      sim%kicks = sim%kicks + 1
+      call sim%drive%kick(sim, kicked)
+      call continue_with(kicked, sim%drive%moves_disks())
+    end do
+    sim%events_done = arrived .or. &
+      (sim%events_done .and. sim%tally%events == events .and. .not. (sim%time() > before .or. changed))
   contains
 
-    !> Advances the time to the next action, if no event will occur any more. If no action is due any more, the time is set to the
-    !> time of the last collision or sample.
+    !> Continues after a change of the velocities of some disks and, if `moved`, of their positions.
+    subroutine continue_with(disks, moved)
+      integer(int32), intent(in) :: disks(:)         !! indices of the disks
+      logical, intent(in) :: moved
+
+      if (ends_by_kick(sim, disks)) then
+        call move_epoch(sim, .true.)
+        call evolution%start(sim)
+      else if (.not. moved) then
+        call evolution%renew(sim, disks)
+      else if (size(disks) > 0) then
+        call evolution%start(sim)
+      end if
+    end subroutine continue_with
+
+    !> If no further event can occur, advances the time to the next action or, without one, to the last collision or sample.
     subroutine wait()
       if (due < last_time) then
         sim%now = max(sim%now, until)
@@ -110,14 +122,14 @@ contains
       end if
     end subroutine wait
 
-    !> Starts the next epoch, or reports that the disks are crushed or that events no longer advance the time.
+    !> Starts the next epoch, unless the disks are crushed or events no longer advance the time, which is reported.
     subroutine end_epoch()
       if (are_crushed(sim)) then
         call fail(error, exit_broken, "side.end_time: the side crushes the disks, whose energy has grown a million times; " &
           //"choose a time before "//about(sim%time()))
       else if (stands_still(sim) .or. has_come_to_rest(sim)) then
         if (limits%at_rest .and. is_at_rest(sim)) return
-        call fail_at_standstill(evolution, sim, error)
+        call fail_at_standstill(sim, evolution%last_event, error)
       else
         call move_epoch(sim, by_event)
         call evolution%start(sim)
@@ -126,33 +138,38 @@ contains
   end subroutine advance_once
 
   !> Reports that events no longer advance the time.
-  subroutine fail_at_standstill(evolution, sim, error)
-    class(evolution_t), intent(in) :: evolution
+  subroutine fail_at_standstill(sim, last, error)
     type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: last(2)            !! index of a disk, and its partner: see `partners`
     type(error_t), allocatable, intent(out) :: error
 
-    associate (i => evolution%last_event(1), code => evolution%last_event(2))
-      call fail(error, exit_broken, standstill(sim, i, code))
-    end associate
+    call fail(error, exit_broken, standstill(sim, last(1), last(2)))
   end subroutine fail_at_standstill
 
-  !> Reports that all disks have come to rest, if a run has reached its number of events or collisions in this state. With a later
-  !> limit, time would no longer advance.
+  !> When a run has reached its number of events or collisions, reports whether time would stop advancing with a later limit,
+  !> because all disks are at rest or one disk rests on a side.
   subroutine report_rest(evolution, sim, limits, error)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(inout) :: error
+    integer(int32) :: last(2)                        ! disk that no longer advances, and its partner
 
-    if (allocated(error) .or. limits%at_rest .or. .not. (sim%epoch_end > 0 .and. limits%reached(sim%tally))) return
-    if (sim%box%has_gravity() .and. evolution%last_event(1) > 0 .and. is_at_rest(sim)) &
-      call fail_at_standstill(evolution, sim, error)
+    if (allocated(error) .or. .not. (sim%epoch_end > 0 .and. limits%reached(sim%tally) .and. sim%box%has_gravity())) return
+    if (sim%n_inside() == 0 .or. sim%tally%has_at_most(limits%disks_inside)) return
+    last = evolution%last_event
+    if (.not. is_at_rest(sim)) then
+      last(1) = disk_on_side(sim)
+      if (last(1) > 0) last(2) = sim%disk(last(1))%partner
+    else if (limits%at_rest) then
+      return
+    end if
+    if (last(1) > 0) call fail_at_standstill(sim, last, error)
   end subroutine report_rest
 
-  !> Number of iterations of the event loop that take about the wall-clock time `pause_interval`. The number of iterations is
-  !> increased only after a call that used all its iterations, and not after a call that reached a limit early. In a run with many
-  !> samples, whose calls all return early, the number would otherwise become arbitrarily large, and signals would not be checked
-  !> for hours after the last sample.
+  !> Number of iterations of the event loop that take about the wall-clock time `pause_interval`. It is increased only after a call
+  !> that used all its iterations. If calls that reach a limit early increased it too, it would grow without bound in a run with
+  !> many samples, and signals would go unchecked for hours after the last sample.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations that were used [s]
@@ -164,19 +181,103 @@ contains
     if (elapsed > 2*pause_interval) n = max(iterations/2, 1_int64)
   end function adapted_iterations
 
-  !> Time of the next kick. A kick is executed after all collisions and before all other actions at the same time.
+  !> Makes the changes that are due. Further events can then occur at the present time, before any
+  !> other action. A kick at the present time follows the changes, unless it has already been applied.
+  subroutine make_changes(evolution, sim, changed, error)
+    class(evolution_t), intent(inout) :: evolution
+    type(simulation_t), intent(inout) :: sim
+    logical, intent(out) :: changed
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: kicked
+
+    changed = .false.
+    kicked = has_kicked(evolution, sim)
+    do while (sim%time() >= next_change(evolution, sim) .and. .not. allocated(error))
+      call make_scheduled_change(sim, error)
+      changed = .true.
+    end do
+    if (.not. changed) return
+    do while (has_kicked(evolution, sim) .and. .not. kicked)    ! `change_system` has counted the kicks up to the present time
+      sim%kicks = sim%kicks - 1
+    end do
+    call evolution%start(sim)
+  end subroutine make_changes
+
+  !> Whether the last kick was at the present time.
+  pure function has_kicked(evolution, sim) result(yes)
+    class(evolution_t), intent(in) :: evolution
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = allocated(sim%drive) .and. sim%kicks > 0
+    if (yes) yes = evolution%pause_at(sim%kick_time(sim%kicks)) >= sim%time()
+  end function has_kicked
+
+  !> Time of the next scheduled change, entry or kick.
+  pure function next_action(evolution, sim) result(t)
+    class(evolution_t), intent(in) :: evolution
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: t                              !! time since the start of the run; set to `never` if there are none
+
+    t = min(next_change(evolution, sim), next_entry(evolution, sim), next_kick(evolution, sim))
+  end function next_action
+
+  !> Time of the next scheduled change, made after all collisions and before all other actions at the same time.
+  pure function next_change(evolution, sim) result(t)
+    class(evolution_t), intent(in) :: evolution
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: t                              !! time since the start of the run; set to `never` if there are none
+
+    t = never
+    if (.not. allocated(sim%schedule)) return
+    if (sim%changes_made < size(sim%schedule)) t = evolution%pause_at(sim%schedule(sim%changes_made + 1)%time)
+  end function next_change
+
+  !> Time of the next action of a source.
+  pure function next_entry(evolution, sim) result(t)
+    class(evolution_t), intent(in) :: evolution
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: t                              !! time since the start of the run; set to `never` if there is none
+    integer :: s
+
+    t = never
+    s = next_source(evolution, sim)
+    if (s > 0) t = evolution%pause_at(entry_time(sim, s))
+  end function next_entry
+
+  !> Index of the source that acts next, at equal times the first in the file; 0 if no source acts any more. With time steps, all
+  !> sources due within a step act at its end, in the order of the file.
+  pure function next_source(evolution, sim) result(next)
+    class(evolution_t), intent(in) :: evolution
+    type(simulation_t), intent(in) :: sim
+    integer :: next, s
+    real(real64) :: t, earliest                    ! [time]
+
+    next = 0
+    if (.not. allocated(sim%source)) return
+    earliest = never
+    do s = 1, size(sim%source)
+      t = entry_time(sim, s)
+      if (t < never) t = evolution%pause_at(t)
+      if (.not. t < earliest) cycle
+      earliest = t
+      next = s
+    end do
+  end function next_source
+
+  !> Time of the next kick, applied after all collisions and before samples at the same time.
   pure function next_kick(evolution, sim) result(t)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
     real(real64) :: t                              !! time since the start of the run; set to `never` if there are no kicks
 
-    t = evolution%pause_at(sim%drive%time_of(sim%kicks + 1))
-    if (evolution%idle .and. sim%drive%moves_disks()) then     ! no other disk will enter `from_region` any more
-      if (.not. are_waiting(sim)) t = never
+    t = evolution%pause_at(sim%kick_time(sim%kicks + 1))
+    if (evolution%idle .and. allocated(sim%drive)) then
+      if (.not. sim%drive%can_act(sim)) t = never
     end if
   end function next_kick
 
-  !> Text of a message: the reason why events of disk i with its partner no longer advance the time, and a remedy.
+  !> Message on why events of disk i with its partner no longer advance the time, with a remedy.
   pure function standstill(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code            !! as in `partners`
@@ -215,7 +316,7 @@ contains
     end if
   end function may_lose
 
-  !> Whether disk i slides along an obstacle whose outline is concave towards the disk.
+  !> Whether disk i slides along an obstacle that is concave towards the disk.
   pure function slides(sim, i, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code
@@ -244,8 +345,8 @@ contains
       //"; the motion after it depends on rounding errors; "//longer_contacts(sim)
   end function collapse_note
 
-  !> Advice to set a contact duration that is much longer than the times in a collapse and much shorter than the mean time between
-  !> collisions. The advice contains a suitable contact duration, unless the present contact duration is already long.
+  !> Advice to set a contact duration much longer than the times in a collapse and much shorter than the mean time between
+  !> collisions, with a suitable value unless the present one is long enough.
   pure function longer_contacts(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text

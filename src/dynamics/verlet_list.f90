@@ -1,10 +1,10 @@
-!> Verlet lists: lists of the pairs whose members are close to each other. A pair consists of two disks, or of a disk and an
-!> obstacle. Disks that are not listed as a pair cannot touch before a disk has moved by half the `skin`. A list is therefore valid
-!> for many steps (Verlet, Physical Review 159, 98 (1967)). Loops that run in every step have no branches, so that the compiler can
-!> vectorise these loops.
+!> Verlet lists of close pairs, of two disks or of a disk and an obstacle. Unlisted pairs cannot touch before a disk has moved by
+!> half the `skin`, so a list is valid for many steps (Verlet, Physical Review 159, 98 (1967)). Loops executed in every step have no
+!> branches, so that the compiler can vectorise them.
 module verlet_list
   use kinds, only: int32, pi, real64
   use box_geometry, only: box_t, obstacle_gap
+  use grid, only: grid_t
   use partners, only: obstacle_code, obstacle_number
   use shapes, only: spare
   use signals, only: stop_requested
@@ -20,12 +20,13 @@ module verlet_list
   real(real64), parameter :: least_skin = 0.2_real64       !! smallest skin [mean diameter]
   real(real64), parameter :: cells_per_disk = 4.0_real64   !! largest number of bins per disk
 
-  !> Pairs that may touch. Pairs of a disk and an obstacle come first, sorted by the obstacle and then by the disk. Pairs of two
-  !> disks follow, sorted by the first disk and then by the second disk.
+  !> Pairs that may touch: first those of a disk and an obstacle, sorted by obstacle and then by
+  !> disk; then those of two disks, sorted by the first and then by the second disk.
   type :: verlet_list_t
     integer(int32) :: n = 0
     integer(int32), allocatable :: i(:)        !! (at least n) index of the first disk of the pair
-    integer(int32), allocatable :: partner(:)  !! (at least n) index of the second disk, larger than i, or code of an obstacle
+    !> (at least n) index of the second disk, larger than i, or boundary id of an obstacle
+    integer(int32), allocatable :: partner(:)
     integer(int32), allocatable :: hit(:)      !! (at least n) 1 if the members of the pair overlap
     integer(int32), private :: n_obstacles = 0 !! number of pairs with obstacles
     logical, private :: known = .false.
@@ -35,11 +36,12 @@ module verlet_list
     procedure :: update
     procedure :: mark_overlaps
     procedure :: shift
+    procedure :: remove
   end type verlet_list_t
 
 contains
 
-  !> Updates the reference position of disk i after the disk has been moved by a period.
+  !> Updates the reference position of disk i after it has been shifted by a period.
   subroutine shift(self, i, dx)
     class(verlet_list_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -48,9 +50,25 @@ contains
     if (self%known) self%from(i, :) = self%from(i, :) + dx
   end subroutine shift
 
-  !> Makes a new list, unless all disks have moved by less than half the skin since the last list was made. If `all_pairs` is
-  !> .true., a new list is made in every step, by a test of all pairs. After a stop request the procedure returns early, with an
-  !> incomplete list.
+  !> Removes the pairs of disk i.
+  pure subroutine remove(self, i)
+    class(verlet_list_t), intent(inout) :: self
+    integer(int32), intent(in) :: i
+    integer(int32) :: k, n
+
+    n = 0
+    self%n_obstacles = self%n_obstacles - count(self%i(:self%n_obstacles) == i, kind=int32)
+    do k = 1, self%n
+      if (self%i(k) == i .or. self%partner(k) == i) cycle
+      n = n + 1
+      self%i(n) = self%i(k)
+      self%partner(n) = self%partner(k)
+    end do
+    self%n = n
+  end subroutine remove
+
+  !> Makes a new list, unless all disks have moved by less than half the skin since the last one. With `all_pairs`, a new list is
+  !> made in every step, by testing all pairs. After a stop request the procedure returns early, with an incomplete list.
   subroutine update(self, sim, x, step, all_pairs)
     class(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -58,7 +76,8 @@ contains
     real(real64), intent(in) :: step           !! [time]
     logical, intent(in) :: all_pairs
     real(real64) :: width                      ! width of a bin: a mean diameter and the skin, or more in a very large box [length]
-    integer(int32) :: bins(2), i, k, still     ! number of disks that have moved by less than half the skin
+    type(grid_t) :: bins
+    integer(int32) :: i, k, still              ! number of disks that have moved by less than half the skin
 
     if (self%known) then
       still = 0
@@ -76,23 +95,25 @@ contains
     if (.not. allocated(self%i)) allocate (self%i(100), self%partner(100), self%hit(100))
     do k = 1, sim%box%n_obstacles()
       do i = 1, sim%n_disks()
+        if (.not. sim%is_inside(i)) cycle
         if (obstacle_gap(sim%box, k, [x(i, 1), x(i, 2)], sim%disk(i)%radius) <= self%skin) &
           call append(self, i, obstacle_code(k))
       end do
     end do
     self%n_obstacles = self%n
     if (all_pairs) then
-      call test_all_pairs(self, x, sim%disk%radius, sim%box%periods())
+      call test_all_pairs(self, sim, x, sim%disk%radius, sim%box%periods())
       return
     end if
     width = max(self%skin + 2*sum(sim%disk%radius)/sim%n_disks(), &
       sqrt(product(sim%box%edges())/(cells_per_disk*sim%n_disks())))
-    bins = int(max(min(sim%box%edges()/width, cells_per_disk*sim%n_disks()), 1.0_real64), int32)
+    call bins%divide(sim%box%lower, sim%box%edges(), &
+      int(max(min(sim%box%edges()/width, cells_per_disk*sim%n_disks()), 1.0_real64), int32))
     call list_disks(self, sim, x, bins)
   contains
 
-    !> Width of a skin with which a list is valid for many steps but does not contain too many distant pairs. The choice of the
-    !> width affects only the speed of the program.
+    !> Width of a skin that keeps a list valid for many steps without too many distant pairs. It affects only the speed of the
+    !> program.
     pure function wanted_skin() result(skin)
       real(real64) :: skin, diameter, reach, fastest
       integer(int32) :: i
@@ -128,60 +149,51 @@ contains
     end associate
   end subroutine mark_overlaps
 
-  !> Adds the pairs of disks that are close to each other. The search for the partners of a disk is limited to smaller disks, and to
-  !> disks of equal size with higher indices. The search for a small disk therefore covers only few bins, however large the largest
-  !> disk is. The grid of bins is treated as periodic along both axes. The periodicity of the grid does not connect disks at
-  !> opposite walls, because their true distance is too large for a pair.
+  !> Adds the pairs of close disks. Partners of a disk are searched for among smaller disks, and among equal disks with higher
+  !> indices, so that the search for a small disk covers few bins, however large the largest disk is. The grid of bins is treated as
+  !> periodic along both axes; disks at opposite walls are nevertheless not paired, because their true distance is too large.
   subroutine list_disks(self, sim, x, bins)
     type(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :)
-    integer(int32), intent(in) :: bins(2)      !! number of columns and rows
-    integer(int32) :: bin(size(x, 1)), place(size(x, 1)), member(size(x, 1)), low(2), high(2), i, iy, row, from, to, first_pair
+    type(grid_t), intent(in) :: bins
+    integer(int32) :: bin(size(x, 1)), member(size(x, 1)), low(2), high(2), i, iy, row, from, to, first_pair
     integer(int32), allocatable :: first(:)
     real(real64) :: period(2), centre(2), reach
 
     period = sim%box%periods()
     do i = 1, size(x, 1, kind=int32)
-      low = modulo(bin_at(in_box([x(i, 1), x(i, 2)])), bins)
-      bin(i) = 1 + low(1) + bins(1)*low(2)
+      low = modulo(floor(bins%in_cells(in_box([x(i, 1), x(i, 2)])), int32), bins%n)
+      bin(i) = 1 + low(1) + bins%n(1)*low(2)
     end do
-    call sort_by_count(bin, product(bins), first, place)
-    member(place) = [(i, i=1, size(x, 1, kind=int32))]
+    call sort_by_count(bin, product(bins%n), first, member)
     first_pair = self%n + 1
     do i = 1, size(x, 1, kind=int32)
+      if (.not. sim%is_inside(i)) cycle
       centre = [x(i, 1), x(i, 2)]
       reach = (2*sim%disk(i)%radius + self%skin)*(1 + spare)
-      low = bin_at(in_box(centre) - reach)
-      high = min(bin_at(in_box(centre) + reach), low + bins - 1)    ! the range contains no bin twice
-      from = 1 + modulo(low(1), bins(1))
+      low = floor(bins%in_cells(in_box(centre) - reach), int32)
+      high = min(floor(bins%in_cells(in_box(centre) + reach), int32), low + bins%n - 1)    ! the range contains no bin twice
+      from = 1 + modulo(low(1), bins%n(1))
       to = from + high(1) - low(1)
       do iy = low(2), high(2)
-        row = bins(1)*modulo(iy, bins(2))
-        call add_run(row + from, row + min(to, bins(1)))
-        call add_run(row + 1, row + to - bins(1))           ! the part of the row beyond the periodic side
+        row = bins%n(1)*modulo(iy, bins%n(2))
+        call add_run(row + from, row + min(to, bins%n(1)))
+        call add_run(row + 1, row + to - bins%n(1))           ! the part of the row beyond the periodic side
       end do
     end do
     call sort_pairs(self%i(first_pair:self%n), self%partner(first_pair:self%n), size(x, 1, kind=int32))
 
   contains
 
-    !> The periodic image of a point inside the box. The position of the image is computed with real numbers, because a disk may
-    !> have moved by more periods than an integer can represent.
+    !> Periodic image of a point inside the box, computed with real numbers, because a disk may have crossed more periods than an
+    !> integer can represent.
     pure function in_box(point) result(image)
       real(real64), intent(in) :: point(2)
       real(real64) :: image(2)
 
       image = sim%box%lower + modulo(point - sim%box%lower, sim%box%edges())
     end function in_box
-
-    !> Column and row of a point in or near the box, counted from 0.
-    pure function bin_at(point) result(c)
-      real(real64), intent(in) :: point(2)
-      integer(int32) :: c(2)
-
-      c = floor((point - sim%box%lower)/sim%box%edges()*bins, int32)
-    end function bin_at
 
     !> Adds the pairs of disk i with disks in bins c to d of a row.
     subroutine add_run(c, d)
@@ -192,15 +204,17 @@ contains
       do k = first(c), first(d + 1) - 1
         j = member(k)
         if (sim%disk(j)%radius > sim%disk(i)%radius .or. (j <= i .and. .not. sim%disk(j)%radius < sim%disk(i)%radius)) cycle
+        if (.not. sim%is_inside(j)) cycle
         if (near(x(j, 1) - centre(1), x(j, 2) - centre(2), sim%disk(i)%radius + sim%disk(j)%radius + self%skin, &
           period(1), period(2)) > 0) call append(self, min(i, j), max(i, j))
       end do
     end subroutine add_run
   end subroutine list_disks
 
-  !> Tests all pairs of disks and adds the pairs whose gap is less than the skin. A stop request ends this procedure early.
-  subroutine test_all_pairs(self, x, radius, period)
+  !> Tests all pairs of disks and adds those separated by less than the skin. A stop request ends this procedure early.
+  subroutine test_all_pairs(self, sim, x, radius, period)
     type(verlet_list_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
     real(real64), contiguous, intent(in) :: x(:, :), radius(:)   !! [length]
     real(real64), intent(in) :: period(2)                        !! [length]
     integer(int32) :: near_i(64), i, j, k, n
@@ -216,7 +230,7 @@ contains
         end do
         if (sum(near_i(:n)) == 0) cycle
         do k = 1, n
-          if (near_i(k) > 0) call append(self, i, j + k)
+          if (near_i(k) > 0 .and. sim%is_inside(i) .and. sim%is_inside(j + k)) call append(self, i, j + k)
         end do
       end do
     end do
@@ -248,19 +262,19 @@ contains
     self%partner(self%n) = partner
   end subroutine append
 
-  !> Sorts pairs of disks by the first disk `i`, and pairs with the same first disk by the second disk `partner`.
+  !> Sorts pairs of disks by the first disk `i`, then by the second disk `partner`.
   subroutine sort_pairs(i, partner, n_disks)
     integer(int32), intent(inout) :: i(:), partner(:)
     integer(int32), intent(in) :: n_disks
-    integer(int32), allocatable :: first(:), place(:)
+    integer(int32), allocatable :: first(:), order(:)
 
-    allocate (place(size(i)))
-    call sort_by_count(partner, n_disks, first, place)
-    i(place) = i
-    partner(place) = partner
-    call sort_by_count(i, n_disks, first, place)
-    i(place) = i
-    partner(place) = partner
+    allocate (order(size(i)))
+    call sort_by_count(partner, n_disks, first, order)
+    i = i(order)
+    partner = partner(order)
+    call sort_by_count(i, n_disks, first, order)
+    i = i(order)
+    partner = partner(order)
   end subroutine sort_pairs
 
 end module verlet_list

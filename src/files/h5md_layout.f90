@@ -1,6 +1,6 @@
-!> Layout of an output file, which follows H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html). This module defines the names of groups
-!> and the fixed paths of datasets. The module `observables` defines the names of observables, and the module `samples` defines the
-!> names in the event log.
+!> Layout of an output file, which follows H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html): the
+!> names of groups and the fixed paths of datasets. The names of observables are defined in
+!> `observables`, those in the event log in `samples`.
 module h5md_layout
   implicit none
   private
@@ -22,7 +22,8 @@ module h5md_layout
     disk_species = disks_group//"species", &
     disk_mass = disks_group//"mass", &
     disk_radius = disks_group//"radius", &
-    changes_at_work = parameters_group//"changes", &
+    changes_at_work = parameters_group//"changes", &     !! all changes, including those of the schedule
+    earlier_changes = checkpoint_group//"changes", &      !! changes that the input in the file already contains
     species_names = parameters_group//"species/names", &
     species_counts = parameters_group//"species/counts"
 
@@ -40,6 +41,7 @@ module h5md_layout
     orientation = disks_group//"orientation", &
     disk_event_count = disks_group//"event_count", &
     image = disks_group//"image", &
+    presence = disks_group//"present", &
     step_of = "/step", time_of = "/time", value_of = "/value"
 
   ! Paths of the datasets that contain the numbers of complete samples
@@ -48,8 +50,8 @@ module h5md_layout
     sample_counter = observables_group//"committed", &
     event_counter = events_group//"committed"
 
-  !> Names that a species must not have, because HDF5 groups that contain the names of species also contain objects with these
-  !> names. The names of observables are also forbidden as names of species.
+  !> Names that a species must not have, because the HDF5 groups named after species also contain
+  !> objects with these names. The names of observables are forbidden, too.
   character(len=*), parameter, public :: beside_species(3) = [character(len=9) :: "committed", "names", "counts"]
 
 end module h5md_layout

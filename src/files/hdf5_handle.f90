@@ -1,11 +1,13 @@
-!> An open HDF5 file, with procedures that create, open, rename, flush and close the file and that create groups and hard links.
+!> An open HDF5 file, with procedures that create, open, rename, flush and close it and that create
+!> groups and hard links.
 !>
-!> The first failure of a call is recorded, and all later calls have no effect. A procedure that writes a file therefore need not
-!> test the result of every call, because the procedure `report` returns the recorded failure at the end.
+!> The first failure is recorded, and all later calls have no effect. A procedure that writes a file
+!> therefore need not test the result of every call; `report` returns the recorded failure at the
+!> end.
 module hdf5_handle
   use, intrinsic :: iso_c_binding, only: c_bool, c_int, c_int64_t
   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
-    h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, h5fget_filesize_f, h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, &
+    h5dclose_f, h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, h5fget_filesize_f, h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, &
     h5pset_create_inter_group_f, h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, &
     h5pset_sieve_buf_size_f, h5pset_small_data_block_size_f, h5pset_sym_k_f, h5p_dataset_create_f, h5p_file_access_f, &
     h5p_file_create_f, h5p_link_create_f, h5d_alloc_time_early_f, h5d_fill_time_never_f, h5f_acc_excl_f, h5f_acc_rdonly_f, &
@@ -20,12 +22,14 @@ module hdf5_handle
   public :: hdf5_handle_t, hdf5_version
 
   integer(size_t), parameter :: sieve = 4096      !! size of the buffer that collects small writes [bytes]
-  !> HDF5 stores the links of a group in nodes that have space for 8 links. The addresses of the link nodes are stored in nodes of a
-  !> second kind, which have space for twice `half_tree_node` addresses. Most groups of an output file have three links. With the
-  !> default of HDF5, which is `half_tree_node` = 16, almost empty nodes would make up a quarter of the file of a small run.
+  !> HDF5 stores the links of a group in nodes with space for 8 links, and the addresses of these
+  !> nodes in nodes of a second kind, with space for twice `half_tree_node` addresses. Most groups
+  !> of an output file have three links. With the default of HDF5, `half_tree_node` = 16, almost
+  !> empty nodes would make up a quarter of the file of a small run.
   integer, parameter :: half_tree_node = 2
-  !> Half of the number of links in a node; the value is the default of HDF5. The 7 links of the group `checkpoint` must fit into
-  !> one node, because `hdf5_objects: remove_last` relies on the order of the last parts of a file.
+  !> Half the number of links in a node, the default of HDF5. The 7 links of the group `checkpoint`
+  !> must fit into one node, because `hdf5_objects: remove_last` relies on the order of the last
+  !> parts of a file.
   integer, parameter :: half_link_node = 4
 
   type :: hdf5_handle_t
@@ -34,9 +38,11 @@ module hdf5_handle
     character(len=:), allocatable :: failure      !! the first action that failed, as a phrase that can follow "cannot "
     logical, private :: has_reason = .false.      !! whether the text `failure` includes a reason
     integer(hid_t) :: id = -1
-    integer(hid_t) :: links = -1                  !! HDF5 properties of links, which make HDF5 create missing groups of a path
+    integer(hid_t) :: links = -1                  !! properties with which HDF5 creates missing groups of a path
     integer(hid_t) :: storage = -1                !! HDF5 properties of datasets, set by `prepare`
     integer(int64) :: unsaved = 0                 !! amount written since the last flush [bytes]
+    integer(hid_t), allocatable, private :: held(:)      !! datasets that stay open; only the first `n_held` are used
+    integer, private :: n_held = 0
   contains
     procedure :: create
     procedure :: open => open_file
@@ -44,6 +50,7 @@ module hdf5_handle
     procedure :: flush => flush_file
     procedure :: close => close_file
     procedure :: discard
+    procedure :: hold
     procedure :: make_group
     procedure :: link
     procedure :: check
@@ -58,7 +65,7 @@ module hdf5_handle
       integer(c_int) :: status
     end function forget_link
 
-    !> Lets HDF5 reserve no space for attributes in the header of a dataset.
+    !> Makes HDF5 reserve no space for attributes in the header of a dataset.
     function reserve_no_attributes(properties, yes) result(status) bind(C, name="H5Pset_dset_no_attrs_hint")
       import :: c_bool, c_int, c_int64_t
       integer(c_int64_t), value :: properties     !! an identifier of HDF5
@@ -69,7 +76,8 @@ module hdf5_handle
 
 contains
 
-  !> Records the failure of an action if `status` indicates an error and no failure has been recorded before.
+  !> Records the failure of an action if `status` indicates an error and no failure has been
+  !> recorded before.
   subroutine check(self, status, action, reason, needed)
     class(hdf5_handle_t), intent(inout) :: self
     integer, intent(in) :: status                 !! return value of an HDF5 call, which is negative after a failure
@@ -95,8 +103,8 @@ contains
     end if
   end subroutine check
 
-  !> Returns the recorded failure as an error, which is not allocated if there was no failure. The message names the file, the
-  !> action, and the reason or the free space on the disk.
+  !> Returns the recorded failure as an error, which is not allocated if there was none. The message
+  !> names the file, the action, and the reason or the free space on the disk.
   subroutine report(self, error)
     class(hdf5_handle_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -110,7 +118,7 @@ contains
     error%message = error%message//": "//written(self%unsaved)//" bytes needed, "//written(free)//" bytes free"
   end subroutine report
 
-  !> Version of the HDF5 library, which is stored among the provenance data of a file.
+  !> Version of the HDF5 library, for the provenance of a file.
   function hdf5_version() result(text)
     character(len=:), allocatable :: text
     integer :: major, minor, release, status
@@ -119,10 +127,10 @@ contains
     text = written(major)//"."//written(minor)//"."//written(release)
   end function hdf5_version
 
-  !> Initialises the HDF5 library. The library is initialised only once per process, because each initialisation leaks memory. The
-  !> settings prevent HDF5 from printing errors and from installing an exit handler. The exit handler is not needed, because the
-  !> program closes all files before it exits. The exit handler would crash if a file could not be closed on a full disk. External
-  !> links are disabled, because external links could refer to devices or to files of other users.
+  !> Initialises the HDF5 library, only once per process, because each initialisation leaks memory.
+  !> HDF5 must not print errors, and needs no exit handler, because the program closes all files
+  !> before it exits; on a full disk, where a file cannot be closed, the exit handler would crash.
+  !> External links are disabled, because they could refer to devices or to files of other users.
   subroutine start_library(status)
     integer, intent(out) :: status
     logical, save :: started = .false.
@@ -138,12 +146,15 @@ contains
     started = status >= 0
   end subroutine start_library
 
-  !> Sets the properties of a file. The file locks of HDF5 are disabled. With file locks, other programs could not read the file
-  !> during a run, and the lock of a reader could stop a run. The storage of a dataset is allocated when the dataset is created.
-  !> Datasets are not filled with a default value and have no time stamps, so that equal runs write equal bytes. Small datasets do
-  !> not share a block of storage, because HDF5 releases a shared block in two steps, between which the header of the file contains
-  !> a wrong length. No space is reserved for attributes of datasets, because the program writes none; the file of a small run is
-  !> therefore a tenth smaller.
+  !> Sets the properties of a file.
+  !> - No file locks: with them, other programs could not read the file during a run, and a reader
+  !>   could stop a run.
+  !> - Storage is allocated when a dataset is created, without filling it and without time stamps,
+  !>   so that equal runs write equal bytes.
+  !> - Small datasets do not share a block of storage, because HDF5 releases a shared block in two
+  !>   steps, between which the header of the file contains a wrong length.
+  !> - No space is reserved for attributes of datasets, which the program never writes; the file of
+  !>   a small run is a tenth smaller.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
     integer(hid_t), intent(out) :: access         !! HDF5 properties of the access to the file
@@ -203,7 +214,7 @@ contains
     call h5pclose_f(access, closed)
   end subroutine open_file
 
-  !> Renames the open file to its final path. An existing file with the final path is replaced.
+  !> Renames the open file to its final path, replacing any file there.
   subroutine rename_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     logical :: moved
@@ -214,7 +225,8 @@ contains
     if (moved) self%path = self%final_path
   end subroutine rename_file
 
-  !> Passes all written data to the operating system, so that no data are lost if the program is killed.
+  !> Passes all written data to the operating system, so that none are lost if the program is
+  !> killed.
   subroutine flush_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     integer :: status
@@ -225,11 +237,23 @@ contains
     if (status >= 0) self%unsaved = 0
   end subroutine flush_file
 
-  !> Closes the file if the file is open, and frees the HDF5 property lists, which exist even if the file could not be opened. After
-  !> the file has been closed, `report` still returns a recorded failure.
+  !> Keeps an open dataset until the file is closed. HDF5 cannot close a file that has open datasets.
+  subroutine hold(self, dataset)
+    class(hdf5_handle_t), intent(inout) :: self
+    integer(hid_t), intent(in) :: dataset
+
+    if (dataset < 0) return
+    if (.not. allocated(self%held)) allocate (self%held(16))
+    if (self%n_held == size(self%held)) self%held = [self%held, self%held]
+    self%n_held = self%n_held + 1
+    self%held(self%n_held) = dataset
+  end subroutine hold
+
+  !> Closes the file, if it is open, and frees the HDF5 property lists, which exist even if opening
+  !> failed. A recorded failure can still be reported.
   subroutine close_file(self)
     class(hdf5_handle_t), intent(inout) :: self
-    integer :: status
+    integer :: status, k
 
     if (self%links >= 0) call h5pclose_f(self%links, status)
     if (self%storage >= 0) call h5pclose_f(self%storage, status)
@@ -237,12 +261,16 @@ contains
     self%storage = -1
     if (self%id < 0) return
     call self%flush()
+    do k = 1, self%n_held
+      call h5dclose_f(self%held(k), status)
+    end do
+    self%n_held = 0
     call h5fclose_f(self%id, status)
     call self%check(status, "be closed")
     self%id = -1
   end subroutine close_file
 
-  !> Closes the file and deletes the file. After the file has been deleted, `report` still returns a recorded failure.
+  !> Closes and deletes the file. A recorded failure can still be reported.
   subroutine discard(self)
     class(hdf5_handle_t), intent(inout) :: self
 
@@ -250,7 +278,7 @@ contains
     call remove_file(self%path)
   end subroutine discard
 
-  !> Creates a group and all missing groups on the path of the group.
+  !> Creates a group, with all missing groups on its path.
   subroutine make_group(self, name)
     class(hdf5_handle_t), intent(inout) :: self
     character(len=*), intent(in) :: name

@@ -1,13 +1,15 @@
 !> Reads and writes attributes and datasets, or parts of datasets, in an open HDF5 file.
 !>
-!> A name of the form `group/dataset` is the path of a dataset; a name of the form `group@name` denotes an attribute of a group.
+!> A name `group/dataset` is the path of a dataset; a name `group@name` denotes an attribute of a
+!> group.
 module hdf5_objects
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use hdf5, only: haddr_t, hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5ldelete_f, &
     h5oopen_f, h5oclose_f, h5acreate_f, h5aopen_f, h5aread_f, h5awrite_f, &
     h5aget_space_f, h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, h5dget_space_f, h5dget_type_f, &
     h5dget_create_plist_f, h5dget_offset_f, h5dget_storage_size_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, &
-    h5d_chunked_f, h5d_virtual_f, h5screate_simple_f, h5sclose_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
+    h5d_chunked_f, h5d_virtual_f, h5iget_name_f, h5screate_simple_f, h5sclose_f, h5sget_simple_extent_dims_f, &
+    h5sget_simple_extent_ndims_f, &
     h5sget_simple_extent_npoints_f, h5sselect_hyperslab_f, h5s_select_set_f, h5tcopy_f, h5tset_size_f, h5tget_size_f, &
     h5tget_class_f, h5tis_variable_str_f, h5tclose_f, h5t_native_double, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, &
     h5t_fortran_s1
@@ -20,8 +22,8 @@ module hdf5_objects
 
   integer, parameter :: scalar(0) = [integer ::]  !! extents of a dataset with a single value
 
-  ! Largest lengths of texts in a file. The lengths of texts are limited, because a damaged file may contain wrong lengths. All
-  ! texts that this program writes are shorter than the limit.
+  ! Limits of the lengths of strings in a file, because a damaged file may state wrong lengths. All
+  ! strings written by this program are shorter.
   integer(int64), parameter :: most_texts = 10000
   integer(size_t), parameter :: longest_text = 67108864      !! [bytes]
 
@@ -29,6 +31,7 @@ module hdf5_objects
   contains
     procedure :: remove_last
     procedure :: make_dataset
+    procedure :: open_dataset
     procedure :: extents
     procedure :: length
     procedure :: transfer
@@ -37,16 +40,18 @@ module hdf5_objects
     procedure :: fetch_text
     procedure :: fetch_texts
     procedure, private :: put_reals, put_integers, put_longs, put_text, put_texts, put_values, put_attribute
-    procedure, private :: fetch_reals, fetch_longs, fetch_values, open_dataset
+    procedure, private :: fetch_reals, fetch_longs, fetch_values
   end type hdf5_file_t
 
 contains
 
-  !> Removes the dataset that was created last, so that the file ends after the values of the dataset `before`. The dataset is
-  !> removed in three steps, after each of which the file is valid. In the first step, the link to the dataset is deleted, but the
-  !> storage is not freed yet, because the dataset is still open. In the second step, the new length of the file is written into its
-  !> header, because HDF5 would write the length only after the truncation of the file. In the third step, the dataset is closed,
-  !> which frees the storage.
+  !> Removes the dataset created last, so that the file ends after the values of the dataset
+  !> `before`, in three steps that each leave a valid file:
+  !> 1. The link to the dataset is deleted. Its storage is not freed yet, because the dataset is
+  !>   still open.
+  !> 2. The new length of the file is written into its header. HDF5 would write it only after
+  !>   truncating the file.
+  !> 3. The dataset is closed, which frees the storage.
   subroutine remove_last(self, name, before)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, before
@@ -73,26 +78,29 @@ contains
     call self%check(merge(0, -1, done), "remove "//name)
   end subroutine remove_last
 
-  !> Creates a dataset.
-  subroutine make_dataset(self, name, type, extents)
+  !> Creates a dataset, and closes it unless it is returned.
+  subroutine make_dataset(self, name, type, extents, opened)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(in) :: type            !! HDF5 type in the file
     integer(hsize_t), intent(in) :: extents(:)    !! shape of the dataset; an empty array for a single value
+    integer(hid_t), intent(out), optional :: opened      !! the open dataset; -1 after a failure
     integer(hid_t) :: dataset, space
     integer :: status, closed
 
+    if (present(opened)) opened = -1
     if (allocated(self%failure)) return
     call h5screate_simple_f(size(extents), extents, space, status)
     if (status >= 0) call h5dcreate_f(self%id, name, type, space, dataset, status, self%storage, self%links)
     call self%check(status, "write "//name)
-    if (status >= 0) call h5dclose_f(dataset, closed)
+    if (status >= 0 .and. present(opened)) opened = dataset
+    if (status >= 0 .and. .not. present(opened)) call h5dclose_f(dataset, closed)
     call h5sclose_f(space, closed)
   end subroutine make_dataset
 
-  !> Opens a dataset whose values are all stored in this file. Datasets with values in other files are refused, because the other
-  !> files could be devices or belong to other users. The size of the storage is checked, because HDF5 1.10 reads beyond the end of
-  !> a damaged dataset.
+  !> Opens a dataset whose values are all stored in this file. Datasets with values in other files
+  !> are refused, because these could be devices or belong to other users. The size of the storage
+  !> is checked, because HDF5 1.10 reads beyond the end of a damaged dataset.
   subroutine open_dataset(self, name, dataset, extents, status, like, bytes_each)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -118,7 +126,8 @@ contains
     if (status >= 0) call h5dget_space_f(dataset, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
     call h5sget_simple_extent_npoints_f(space, n, closed)
-    ! For a dataset without values, HDF5 reports a failure when the number of values or the storage size is queried.
+    ! For a dataset without values, HDF5 reports a failure when the number of values or the storage
+    ! size is queried.
     if (closed < 0) n = 0
     if (status >= 0) call h5sget_simple_extent_dims_f(space, shape, most, status)
     call h5sclose_f(space, closed)
@@ -140,7 +149,7 @@ contains
     if (status < 0) call h5dclose_f(dataset, closed)
   end subroutine open_dataset
 
-  !> Shape of a dataset; the result is [-1] if the dataset does not exist.
+  !> Shape of a dataset; [-1] if it does not exist.
   function extents(self, name, bytes) result(extent)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -155,8 +164,8 @@ contains
     if (status >= 0) call h5dclose_f(dataset, status)
   end function extents
 
-  !> Number of values in a dataset. The result is -1 if the dataset does not exist, or if its stated size exceeds the size of the
-  !> largest possible file.
+  !> Number of values in a dataset; -1 if it does not exist, or if its stated size exceeds that of
+  !> the largest possible file.
   function length(self, name) result(n)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -165,7 +174,7 @@ contains
     n = product_of(self%extents(name))
   end function length
 
-  !> Number of values of an array with the given extents; -1 if no file can contain so many values.
+  !> Number of values of an array with the given extents; -1 if no file can contain so many.
   pure function product_of(extents) result(n)
     integer(hsize_t), intent(in) :: extents(:)
     integer(int64) :: n
@@ -174,20 +183,20 @@ contains
     if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
   end function product_of
 
-  !> Transfers a part of a dataset: writes the values at a memory address to the file, or reads values from the file to a memory
-  !> address.
-  subroutine transfer(self, name, first, counts, type, address, writing)
+  !> Transfers a part of an open dataset: writes the values at a memory address to the file, or reads values from the file to a
+  !> memory address. HDF5 can keep small amounts of written values until `flush`.
+  subroutine transfer(self, dataset, first, counts, type, address, writing)
     class(hdf5_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
+    integer(hid_t), intent(in) :: dataset
     integer(int64), intent(in) :: first           !! first index along the last dimension, starting at 1
-    !> Number of values along each dimension. The part may be smaller than the dataset only along the last dimension.
+    !> Number of values along each dimension. The part may be smaller than the dataset only along
+    !> the last dimension.
     integer(int64), intent(in) :: counts(:)
     integer(hid_t), intent(in) :: type            !! HDF5 type in memory
     type(c_ptr), intent(in) :: address
     logical, intent(in) :: writing
-    integer(hid_t) :: dataset, in_file, in_memory
+    integer(hid_t) :: in_file, in_memory
     integer(hsize_t) :: start(size(counts))
-    integer(hsize_t), allocatable :: extents(:)
     integer(size_t) :: bytes                      ! size of one value [bytes]
     type(c_ptr) :: place
     integer :: status, closed
@@ -198,18 +207,28 @@ contains
     start = 0
     start(size(start)) = first - 1
     place = address
-    call self%open_dataset(name, dataset, extents, status)
     call h5screate_simple_f(size(counts), int(counts, hsize_t), in_memory, closed)
-    if (status >= 0) call h5dget_space_f(dataset, in_file, status)
+    call h5dget_space_f(dataset, in_file, status)
     if (status >= 0) call h5sselect_hyperslab_f(in_file, h5s_select_set_f, start, int(counts, hsize_t), status)
     if (status >= 0 .and. writing) call h5dwrite_f(dataset, type, place, status, in_memory, in_file)
     if (status >= 0 .and. .not. writing) call h5dread_f(dataset, type, place, status, in_memory, in_file)
-    call self%check(status, trim(merge("write   ", "be read:", writing))//" "//name)
+    if (status < 0) call self%check(status, trim(merge("write   ", "be read:", writing))//" "//path_of(dataset))
     call h5sclose_f(in_file, closed)
     call h5sclose_f(in_memory, closed)
-    call h5dclose_f(dataset, status)              ! when a dataset is closed, HDF5 writes its buffered values
-    call self%check(status, "write "//name)
   end subroutine transfer
+
+  !> Path of an open dataset in its file, without the slash at the beginning.
+  function path_of(dataset) result(path)
+    integer(hid_t), intent(in) :: dataset
+    character(len=:), allocatable :: path
+    character(len=256) :: text
+    integer(size_t) :: length
+    integer :: status
+
+    call h5iget_name_f(dataset, text, len(text, size_t), length, status)
+    path = "a dataset"
+    if (status >= 0 .and. length > 1) path = text(2:min(int(length), len(text)))
+  end function path_of
 
   !> Writes real numbers in double precision.
   subroutine put_reals(self, name, extents, values)
@@ -241,11 +260,11 @@ contains
     call self%put_values(name, extents, h5t_std_i64le, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
   end subroutine put_longs
 
-  !> Writes one text. An empty text is stored as one blank.
+  !> Writes one string. An empty string is stored as one blank.
   subroutine put_text(self, name, text)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, text
-    character(len=:), allocatable, target :: padded     ! allocatable, because a long text would not fit on the stack
+    character(len=:), allocatable, target :: padded     ! allocatable, because a long string would not fit on the stack
     integer(hid_t) :: string
     integer :: closed
 
@@ -256,7 +275,7 @@ contains
     call h5tclose_f(string, closed)
   end subroutine put_text
 
-  !> Writes a list of texts, padded with blanks to the length of the longest text.
+  !> Writes a list of strings, padded with blanks to the length of the longest.
   subroutine put_texts(self, name, texts)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -271,7 +290,7 @@ contains
     call h5tclose_f(string, closed)
   end subroutine put_texts
 
-  !> Creates the HDF5 type of texts that have a fixed length and are padded with blanks.
+  !> Creates the HDF5 type of strings of fixed length padded with blanks.
   function string_of(length) result(string)
     integer, intent(in) :: length
     integer(hid_t) :: string
@@ -281,7 +300,7 @@ contains
     call h5tset_size_f(string, int(length, size_t), status)
   end function string_of
 
-  !> Writes a dataset or an attribute. A missing dataset or attribute is created; an existing dataset or attribute must have the
+  !> Writes a dataset or an attribute, which is created if it is missing; otherwise it must have the
   !> same number of values.
   subroutine put_values(self, name, extents, stored_as, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
@@ -355,8 +374,8 @@ contains
     call self%fetch_values(name, n, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
   end subroutine fetch_longs
 
-  !> Reads a dataset or an attribute of n values. If the dataset or attribute cannot be read, or if the number or the type of its
-  !> values differs from that of `values`, `values` is not changed.
+  !> Reads a dataset or an attribute of n values. If this fails, or if the number or the type of the
+  !> values differs from that of `values`, the latter is left unchanged.
   subroutine fetch_values(self, name, n, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -396,7 +415,7 @@ contains
     call self%check(status, "be read: "//name)
   end subroutine fetch_values
 
-  !> Reads a list of texts. Each text is truncated or padded to the given length.
+  !> Reads a list of strings, truncated or padded to the given length.
   subroutine fetch_texts(self, name, length, texts)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -412,7 +431,7 @@ contains
     call h5tclose_f(string, closed)
   end subroutine fetch_texts
 
-  !> Reads one text of any length.
+  !> Reads one string of any length.
   subroutine fetch_text(self, name, text)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name

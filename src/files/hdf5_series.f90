@@ -1,11 +1,11 @@
-!> Series: datasets to which samples are added along the last dimension. The whole storage of a dataset is allocated when the
-!> dataset is created, although the file system uses disk space only for the part that has been written. After a dataset has been
-!> created, only its values are written. Other programs can therefore read the file at any time, and the file is consistent even if
-!> the program is killed.
+!> Series: datasets to which samples are added along the last dimension. The whole storage of a
+!> dataset is allocated when it is created, although the file system uses disk space only for the
+!> part that has been written. After that only values are written. Other programs can therefore read
+!> the file at any time, and it is consistent even if the program is killed.
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
-  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5_real_kind, h5kind_to_type, h5t_ieee_f32le, h5t_ieee_f64le, &
+  use hdf5, only: hid_t, hsize_t, h5dclose_f, h5_integer_kind, h5_real_kind, h5kind_to_type, h5t_ieee_f32le, h5t_ieee_f64le, &
     h5t_std_i32le, h5t_std_i64le
   use hdf5_objects, only: hdf5_file_t
   use kinds, only: int32, int64, real64
@@ -20,23 +20,27 @@ module hdf5_series
   integer(int64), parameter :: copied_at_once = 1048576     !! size of the buffer for copying [bytes]
 
   !> One series. After the name, the storage type and the shape have been set, the series is created in a new file or located in an
-  !> existing file.
+  !> existing file. From then on its dataset is open until `close`, or until the file that holds it is closed.
   type :: series_t
     character(len=96) :: name = ""                !! path of the dataset
     integer :: storage = double_precision
-    integer :: rank = 0                           !! number of dimensions of one sample; 0 if a sample is a single number
+    integer :: rank = 0                           !! number of dimensions of one sample; 0 for a single number
     integer :: shape(2) = 1                       !! shape of one sample; unused dimensions have the extent 1
     integer(int64) :: capacity = 0                !! number of samples that fit into the dataset
+    integer(hid_t) :: dataset = -1                !! the open dataset
   contains
     procedure :: make
     procedure :: find
-    procedure :: store
+    procedure :: close => close_series
+    procedure :: pass
+    generic :: store => store_reals, store_integers
     procedure :: load
     procedure :: copy
     procedure :: width
+    procedure :: has_integers
     procedure :: holds
     procedure :: bytes_per_sample
-    procedure, private :: extents, storage_type
+    procedure, private :: store_reals, store_integers, extents, storage_type
   end type series_t
 
 contains
@@ -49,10 +53,18 @@ contains
     width = product(self%shape)
   end function width
 
+  !> Whether the values of the series are integers.
+  elemental function has_integers(self) result(yes)
+    class(series_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%storage == short_integer .or. self%storage == long_integer
+  end function has_integers
+
   !> Whether the storage type can represent all given values.
   pure function holds(self, values) result(yes)
     class(series_t), intent(in) :: self
-    real(real64), intent(in) :: values(:, :)      !! (width,samples)
+    integer(int64), intent(in) :: values(:, :)    !! (width,samples)
     logical :: yes
 
     yes = .true.
@@ -92,19 +104,22 @@ contains
     integer(int64), intent(in) :: capacity
 
     self%capacity = capacity
-    call file%make_dataset(trim(self%name), self%storage_type(), int(self%extents(capacity), hsize_t))
+    call file%make_dataset(trim(self%name), self%storage_type(), int(self%extents(capacity), hsize_t), self%dataset)
   end subroutine make
 
-  !> Locates the series in a file. The samples in the file must have the expected shape. Integers may have 64 bits in the file even
-  !> if 32 bits are expected.
+  !> Locates the series in a file, in which the samples must have the expected shape. Integers may
+  !> have 64 bits in the file even if 32 bits are expected.
   subroutine find(self, file)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(hsize_t), allocatable :: extents(:)
-    integer :: bytes
+    integer :: bytes, status
     logical :: there
 
-    allocate (extents, source=file%extents(trim(self%name), bytes))
+    self%dataset = -1
+    if (allocated(file%failure)) return
+    call file%open_dataset(trim(self%name), self%dataset, extents, status, bytes_each=bytes)
+    if (status < 0) self%dataset = -1
     if (self%storage == short_integer .and. bytes == bytes_of(long_integer)) self%storage = long_integer
     there = size(extents) == self%rank + 1 .and. extents(1) >= 0
     if (there) there = all(extents(:self%rank) == self%shape(:self%rank))
@@ -112,47 +127,74 @@ contains
     call file%check(merge(0, -1, there), "be read: there is no "//trim(self%name)//" of the expected shape")
   end subroutine find
 
-  !> Converts samples to the type in the file and stores the samples. The values are converted to single precision by this procedure
-  !> and not by HDF5, because HDF5 would need ten times as long. A single sample in double precision is written without a copy,
-  !> because a sample may be large.
-  subroutine store(self, file, first, values)
+  !> Closes the dataset. When a dataset is closed, HDF5 writes its buffered values.
+  subroutine close_series(self, file)
+    class(series_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer :: status
+
+    if (self%dataset < 0) return
+    call h5dclose_f(self%dataset, status)
+    call file%check(status, "write "//trim(self%name))
+    self%dataset = -1
+  end subroutine close_series
+
+  !> Stores samples of reals. The values are converted to single precision by this procedure and not by
+  !> HDF5, because HDF5 would need ten times as long. A single sample in double precision is written
+  !> without a copy, because a sample may be large.
+  subroutine store_reals(self, file, first, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: first           !! number of the first sample, starting at 1
     real(real64), intent(in), target :: values(:, :)     !! (width,samples)
     real(real64), allocatable, target :: doubles(:, :)
     real(real32), allocatable, target :: singles(:, :)
-    integer(int32), allocatable, target :: shorts(:, :)
-    integer(int64), allocatable, target :: longs(:, :)
-    integer(hid_t) :: type
-    integer(int64) :: count
-    type(c_ptr) :: address
 
     if (allocated(file%failure)) return
-    count = size(values, 2)
-    select case (self%storage)
-    case (double_precision)
-      type = h5kind_to_type(real64, h5_real_kind)
-      address = c_loc(values(1, 1))
-      if (count > 1) then
-        doubles = values
-        address = c_loc(doubles)
-      end if
-    case (single_precision)
-      type = h5kind_to_type(real32, h5_real_kind)
+    if (self%storage == single_precision) then
       singles = real(values, real32)
-      address = c_loc(singles)
-    case (short_integer)
-      type = h5kind_to_type(int32, h5_integer_kind)
+      call self%pass(file, first, size(values, 2, int64), h5kind_to_type(real32, h5_real_kind), c_loc(singles), .true.)
+    else if (size(values, 2) == 1) then
+      call self%pass(file, first, 1_int64, h5kind_to_type(real64, h5_real_kind), c_loc(values(1, 1)), .true.)
+    else
+      doubles = values
+      call self%pass(file, first, size(values, 2, int64), h5kind_to_type(real64, h5_real_kind), c_loc(doubles), .true.)
+    end if
+  end subroutine store_reals
+
+  !> Stores samples of integers, converted to the type in the file.
+  subroutine store_integers(self, file, first, values)
+    class(series_t), intent(in) :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer(int64), intent(in) :: first           !! number of the first sample, starting at 1
+    integer(int64), intent(in), target :: values(:, :)   !! (width,samples)
+    integer(int32), allocatable, target :: shorts(:, :)
+    integer(int64), allocatable, target :: longs(:, :)
+
+    if (allocated(file%failure)) return
+    if (self%storage == short_integer) then
       shorts = int(values, int32)
-      address = c_loc(shorts)
-    case default
-      type = h5kind_to_type(int64, h5_integer_kind)
-      longs = int(values, int64)
-      address = c_loc(longs)
-    end select
-    call file%transfer(trim(self%name), first, self%extents(count), type, address, writing=.true.)
-  end subroutine store
+      call self%pass(file, first, size(values, 2, int64), h5kind_to_type(int32, h5_integer_kind), c_loc(shorts), .true.)
+    else if (size(values, 2) == 1) then
+      call self%pass(file, first, 1_int64, h5kind_to_type(int64, h5_integer_kind), c_loc(values(1, 1)), .true.)
+    else
+      longs = values
+      call self%pass(file, first, size(values, 2, int64), h5kind_to_type(int64, h5_integer_kind), c_loc(longs), .true.)
+    end if
+  end subroutine store_integers
+
+  !> Writes samples at a memory address to the file, or reads samples.
+  subroutine pass(self, file, first, count, type, address, writing)
+    class(series_t), intent(in) :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer(int64), intent(in) :: first           !! number of the first sample, starting at 1
+    integer(int64), intent(in) :: count           !! number of samples
+    integer(hid_t), intent(in) :: type            !! HDF5 type in memory
+    type(c_ptr), intent(in) :: address
+    logical, intent(in) :: writing
+
+    call file%transfer(self%dataset, first, self%extents(count), type, address, writing)
+  end subroutine pass
 
   !> Reads one sample and converts its values to double precision.
   subroutine load(self, file, number, values)
@@ -163,14 +205,14 @@ contains
 
     if (number < 1 .or. number > self%capacity) call file%check(-1, "be read: "//trim(self%name)//" has no sample " &
       //written(number))
-    call file%transfer(trim(self%name), number, self%extents(1_int64), h5kind_to_type(real64, h5_real_kind), c_loc(values), &
-      writing=.false.)
+    call self%pass(file, number, 1_int64, h5kind_to_type(real64, h5_real_kind), c_loc(values), writing=.false.)
   end subroutine load
 
   !> Copies the first `count` samples of the same series from another file.
-  subroutine copy(self, file, source, count)
+  subroutine copy(self, file, source, from, count)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file, source
+    type(series_t), intent(in) :: from            !! the series in the file `source`
     integer(int64), intent(in) :: count
     integer(int8), allocatable, target :: buffer(:)
     integer(int64) :: first, n, step
@@ -179,8 +221,8 @@ contains
     allocate (buffer(min(step, count)*self%bytes_per_sample()))
     do first = 1, count, step
       n = min(step, count - first + 1)
-      call source%transfer(trim(self%name), first, self%extents(n), self%storage_type(), c_loc(buffer), writing=.false.)
-      call file%transfer(trim(self%name), first, self%extents(n), self%storage_type(), c_loc(buffer), writing=.true.)
+      call from%pass(source, first, n, self%storage_type(), c_loc(buffer), writing=.false.)
+      call self%pass(file, first, n, self%storage_type(), c_loc(buffer), writing=.true.)
     end do
   end subroutine copy
 

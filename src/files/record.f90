@@ -1,6 +1,6 @@
-!> A record: a sequence of numbers that is stored, together with a checksum, in one dataset of an open file. The same sequence of
-!> calls counts, writes or reads the numbers, depending on the mode, so that the numbers are always read in the order in which they
-!> were written.
+!> A record: a sequence of numbers stored, together with a checksum, in one dataset of an open file.
+!> Depending on the mode, the same sequence of calls counts, writes or reads the numbers, so that
+!> they are always read in the order in which they were written.
 module record
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_int8_t, c_loc, c_long, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8
@@ -15,12 +15,13 @@ module record
   integer, parameter :: counting = 0, writing = 1, reading = 2
   integer(int64), parameter :: bytes_of_word = 8
 
-  !> A record: a sequence of numbers of 64 bits.
+  !> A record: a sequence of 64-bit numbers.
   type :: record_t
     character(len=:), allocatable :: name         !! path of the dataset
     integer :: mode = counting
-    integer(int64) :: words = 0                   !! number of words that have been counted, written or read
-    integer(int64), private :: crc = 0            !! checksum of the words that have been written or read
+    integer(int64) :: words = 0                   !! number of words counted, written or read so far
+    integer(int64), private :: crc = 0            !! checksum of the words written or read so far
+    type(series_t), private :: series             !! the dataset, open between `begin` and `seal`
   contains
     generic :: exchange => exchange_real, exchange_reals, exchange_long, exchange_longs
     procedure :: make
@@ -31,10 +32,10 @@ module record
   end type record_t
 
   interface
-    !> Calculates the CRC-32 checksum with the library zlib, on which HDF5 depends.
+    !> CRC-32 checksum from the library zlib, on which HDF5 depends.
     pure function crc32(crc, bytes, length) bind(C) result(continued)
       import :: c_int, c_int8_t, c_long
-      integer(c_long), value :: crc                   !! checksum of the preceding bytes; 0 if there are no preceding bytes
+      integer(c_long), value :: crc                   !! checksum of the preceding bytes; 0 if there are none
       integer(c_int8_t), intent(in) :: bytes(*)
       integer(c_int), value :: length
       integer(c_long) :: continued
@@ -59,16 +60,21 @@ contains
 
     words = series_t(self%name, long_integer)
     call words%make(file, self%words)
+    call words%close(file)
   end subroutine make
 
   !> Returns to the beginning of the record, in order to count, write or read the numbers.
-  subroutine begin(self, mode)
+  subroutine begin(self, mode, file)
     class(record_t), intent(inout) :: self
     integer, intent(in) :: mode
+    type(hdf5_file_t), intent(inout) :: file
 
     self%mode = mode
     self%words = 0
     self%crc = 0
+    if (mode == counting) return
+    self%series = series_t(self%name, long_integer)
+    call self%series%find(file)
   end subroutine begin
 
   !> Counts, writes or reads one real number.
@@ -107,8 +113,8 @@ contains
     call self%pass(file, c_loc(values), size(values))
   end subroutine exchange_longs
 
-  !> Writes the checksum at the end of a record, or reads the stored checksum and compares it with the checksum of the numbers. If
-  !> the stored checksum differs from the calculated checksum, the procedure records a failure of the file.
+  !> Writes the checksum at the end of a record, or compares the stored checksum with that of the
+  !> numbers read. If they differ, a failure of the file is recorded.
   subroutine seal(self, file)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -118,10 +124,11 @@ contains
     there = crc
     call self%exchange(file, there)
     if (there /= crc) call file%check(-1, "be read: the checksum of "//self%name//" is wrong")
+    call self%series%close(file)
   end subroutine seal
 
-  !> Counts n words of 64 bits, writes n words from a memory address, or reads n words to a memory address. The words are numbers,
-  !> or components of derived types without padding.
+  !> Counts, writes or reads n words of 64 bits, which are stored in memory from `address` on. The
+  !> words are numbers, or components of derived types without padding.
   subroutine pass(self, file, address, n)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -131,8 +138,8 @@ contains
 
     if (n == 0) return
     if (self%mode /= counting) then
-      call file%transfer(self%name, self%words + 1, [int(n, int64)], h5kind_to_type(int64, h5_integer_kind), &
-        address, self%mode == writing)
+      call self%series%pass(file, self%words + 1, int(n, int64), h5kind_to_type(int64, h5_integer_kind), address, &
+        self%mode == writing)
       call c_f_pointer(address, bytes, [bytes_of_word*n])
       self%crc = crc32(int(self%crc, c_long), bytes, size(bytes, kind=c_int))
     end if

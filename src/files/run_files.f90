@@ -1,6 +1,6 @@
-!> Names of the files of a run, which are derived from the path of the output, OUT.h5. The module also contains the rules for
-!> replacing and removing files. Only files that a run has written may be replaced or removed. Files that contain results may be
-!> replaced only with the option `--force`.
+!> Names of the files of a run, derived from the path of the output, OUT.h5, and rules for replacing
+!> and removing files. Only files written by a run may be replaced or removed, and files with
+!> results only with `--force`.
 module run_files
   use errors, only: error_t, exit_files, exit_usage, fail
   use kinds, only: int64
@@ -10,16 +10,17 @@ module run_files
   private
   public :: output_of, is_file, source_of, check_name, check_places, check_replaced, take_final_name
 
-  ! Extensions that are appended to the name of the output
+  ! Extensions appended to the name of the output
   character(len=*), parameter, public :: &
     unfinished = ".part", &                       !! extension of the output file during the run
     unfinished_new = ".part_new", &               !! extension of a new output file until its contents are complete
-    lock = ".lock"                                !! extension of the lock file that prevents other runs from writing to the output
+    !> extension of the lock file that prevents other runs from writing the same output
+    lock = ".lock"
   character(len=9), parameter :: endings(*) = [character(len=9) :: "", unfinished, unfinished_new, lock]
 
 contains
 
-  !> Path of the output to which an auxiliary file belongs; empty if the argument is not the path of an auxiliary file.
+  !> Path of the output to which an auxiliary file belongs; empty for any other path.
   pure function output_of(path) result(output)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: output
@@ -41,7 +42,8 @@ contains
     yes = what_is(path) /= "nothing"
   end function is_file
 
-  !> The file from which a run is resumed: the unfinished output if it exists, otherwise the finished output.
+  !> File from which a run is resumed: the unfinished output if it exists, otherwise the finished
+  !> output.
   function source_of(output) result(path)
     character(len=*), intent(in) :: output        !! path of the finished output
     character(len=:), allocatable :: path

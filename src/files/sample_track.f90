@@ -2,13 +2,13 @@
 !> observables and the event log are tracks. A counter in the file contains the number of complete samples of a track. Readers and
 !> resumed runs can rely on the counter, because the counter is written after the values have been flushed.
 !>
-!> A sample is an array of reals that contains the values of all series, one series after another. Integers in a sample are exact
-!> only up to 2**53, because they are stored as double-precision numbers. Small samples are buffered, because one HDF5 call takes as
-!> much time as writing a hundred kilobytes.
+!> A sample contains the reals and the integers of all series, one series after another. Small samples
+!> are buffered, because one HDF5 call takes as much time as writing a hundred kilobytes.
 module sample_track
   use kinds, only: int64, real64
   use hdf5_objects, only: hdf5_file_t, scalar
   use hdf5_series, only: long_integer, series_t
+  use sample_numbers, only: first_values, sample_t
   use system, only: seconds
   use texts, only: written
   implicit none
@@ -31,7 +31,7 @@ module sample_track
     integer(int64), private :: committed = 0            !! number of complete samples in the file
     integer(int64), private :: waiting = 0              !! number of samples in the buffer
     real(real64), private :: waiting_since = 0.0_real64 !! time when the oldest sample in the buffer was added [s]
-    real(real64), allocatable, private :: buffer(:, :)  !! (width,batch)
+    type(sample_t), private :: buffer                   !! samples that wait; room for a batch
   contains
     procedure :: appended
     procedure :: bytes_per_sample
@@ -100,19 +100,18 @@ contains
   !> file keeps its types, and the next file that is created contains 64-bit integers.
   subroutine widen(self, samples, widened)
     class(track_t), intent(inout) :: self
-    real(real64), intent(in) :: samples(:, :)           !! (width,count)
+    type(sample_t), intent(in) :: samples
     logical, intent(out) :: widened                     !! whether the type of any series has changed
-    integer :: k, first
+    integer :: first(size(self%series)), k
 
     widened = .false.
-    first = 1
+    first = first_values(self%series%width(), self%series%has_integers())
     do k = 1, size(self%series)
       associate (series => self%series(k))
-        if (.not. series%holds(samples(first:first + series%width() - 1, :))) then
-          series%storage = long_integer
-          widened = .true.
-        end if
-        first = first + series%width()
+        if (.not. series%has_integers()) cycle
+        if (series%holds(samples%integers(first(k):first(k) + series%width() - 1, :))) cycle
+        series%storage = long_integer
+        widened = .true.
       end associate
     end do
   end subroutine widen
@@ -127,6 +126,7 @@ contains
     self%capacity = capacity
     do k = 1, size(self%series)
       call self%series(k)%make(file, capacity)
+      call file%hold(self%series(k)%dataset)
     end do
     call self%link_step_and_time(file)
     call self%put_counter(file)
@@ -163,6 +163,7 @@ contains
       //written(committed(1))//", the checkpoint says "//written(count))
     do k = 1, size(self%series)
       call self%series(k)%find(file)
+      call file%hold(self%series(k)%dataset)
       if (self%series(k)%capacity < committed(1)) call file%check(-1, "be continued: "//self%counter//" is " &
         //written(committed(1))//", but "//trim(self%series(k)%name)//" has only "//written(self%series(k)%capacity))
     end do
@@ -184,11 +185,13 @@ contains
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file, source
     integer(int64), intent(in) :: capacity
+    type(series_t) :: old(size(self%series))
     integer :: k
 
+    old = self%series
     call self%make(file, capacity)
     do k = 1, size(self%series)
-      call self%series(k)%copy(file, source, self%committed)
+      call self%series(k)%copy(file, source, old(k), self%committed)
     end do
   end subroutine move
 
@@ -215,18 +218,18 @@ contains
   subroutine append(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    real(real64), intent(in) :: samples(:, :)           !! (width,count)
+    type(sample_t), intent(in) :: samples
     integer(int64) :: count
 
-    count = size(samples, 2)
+    count = samples%count()
     if (self%waiting + count > self%batch()) call self%flush(file, 0.0_real64)
     if (count >= self%batch()) then
       call self%commit(file, samples)
       return
     end if
-    if (.not. allocated(self%buffer)) allocate (self%buffer(size(samples, 1), self%batch()))
+    if (.not. allocated(self%buffer%reals)) call self%buffer%make_room(samples, self%batch())
     if (self%waiting == 0) self%waiting_since = seconds()
-    self%buffer(:, self%waiting + 1:self%waiting + count) = samples
+    call self%buffer%insert(self%waiting, samples)
     self%waiting = self%waiting + count
     if (self%waiting == self%batch()) call self%flush(file, 0.0_real64)
   end subroutine append
@@ -239,7 +242,7 @@ contains
 
     if (self%waiting == 0) return
     if (seconds() - self%waiting_since < least_wait) return
-    call self%commit(file, self%buffer(:, :self%waiting))
+    call self%commit(file, self%buffer%first(self%waiting))
     self%waiting = 0
   end subroutine flush_buffer
 
@@ -247,17 +250,23 @@ contains
   subroutine commit(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    real(real64), intent(in) :: samples(:, :)           !! (width,count)
-    integer :: k, first
+    type(sample_t), intent(in) :: samples
+    integer :: first(size(self%series)), last, k
 
-    first = 1
+    first = first_values(self%series%width(), self%series%has_integers())
     do k = 1, size(self%series)
-      call self%series(k)%store(file, self%committed + 1, samples(first:first + self%series(k)%width() - 1, :))
-      first = first + self%series(k)%width()
+      associate (series => self%series(k))
+        last = first(k) + series%width() - 1
+        if (series%has_integers()) then
+          call series%store(file, self%committed + 1, samples%integers(first(k):last, :))
+        else
+          call series%store(file, self%committed + 1, samples%reals(first(k):last, :))
+        end if
+      end associate
     end do
     call file%flush()
     if (allocated(file%failure)) return
-    self%committed = self%committed + size(samples, 2)
+    self%committed = self%committed + samples%count()
     call self%put_counter(file)
     call file%flush()
   end subroutine commit

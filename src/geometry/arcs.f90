@@ -1,12 +1,11 @@
 !> Arcs of circles, impenetrable from both sides. Disks also collide with the ends of an arc.
 !>
-!> The centre of a disk that touches an arc from outside is on a circle whose radius is the sum of the radii of arc and disk. The
-!> centre of a disk that touches an arc from inside is on a circle whose radius is the radius of the arc minus the radius of the
-!> disk. A disk with a larger radius than the arc can touch only the ends of the arc from inside. A disk whose centre is on one of
-!> the two circles touches the arc only if its centre is between the first and the last angle of the arc. The centre of a disk that
-!> touches an end of the arc is on a circle around the end of the arc. Where the circle of a face (the outer or inner side of the
-!> arc) meets the circle of an end, the two circles have a common tangent. If rounding errors hide a contact with a face near an end
-!> of the arc, the contact with the end is therefore found instead.
+!> The centre of a disk that touches an arc lies on a circle about the centre of the arc. The radius of this circle is the sum of
+!> both radii for a disk outside of the arc, and the radius of the arc minus that of the disk for a disk inside. In both cases the
+!> centre must lie between the first and the last angle of the arc. A disk larger than the arc can touch it from inside only at its
+!> ends. The centre of a disk touching an end lies on a
+!> circle around that end, which meets the circle of either face (the outer or inner side of the arc) with a common tangent. A
+!> contact with a face that rounding errors hide near an end is therefore found as a contact with the end.
 module arcs
   use free_flight, only: flight, later_time_to_circle, time_to_circle
   use kinds, only: never, pi, real64
@@ -59,7 +58,7 @@ contains
     arc%is_convex = .false.
     low = radius*minval(arc%end_direction, dim=2)
     high = radius*maxval(arc%end_direction, dim=2)
-    do k = 0, 3  ! the points of the circle that are farthest to the right, to the top, to the left and to the bottom
+    do k = 0, 3  ! the points of the circle that are farthest to the right, top, left and bottom
       point = vector_at(90.0_real64*k)
       if (.not. arc%is_in_window(point)) cycle
       low = min(low, radius*point)
@@ -70,7 +69,7 @@ contains
     arc%extent = 0.5_real64*(high - low)
     offset = magnitude(arc%centre)
     arc%circumradius = maxval([(magnitude(arc%end_point(k)), k=1, 2)])
-    if (arc%is_in_window(arc%centre)) arc%circumradius = radius + offset   ! the arc has the farthest point of the circle
+    if (arc%is_in_window(arc%centre)) arc%circumradius = radius + offset   ! the farthest point of the circle belongs to the arc
   end function new_arc
 
   !> Unit vector in the direction of an angle. For a multiple of 90 degrees the result is exact.
@@ -89,16 +88,18 @@ contains
       e = -e
     case (3)
       e = [e(2), -e(1)]
-    case default                                ! 0: the vector needs no rotation
+    case default                                ! 0: no rotation
     end select
   end function vector_at
 
-  !> Whether the direction of a vector from the centre of the circle is between the first and the last angle of the arc.
+  !> Whether the direction of a vector from the centre of the circle lies between the first and the
+  !> last angle of the arc.
   pure function is_in_window(self, c) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: c(2)            !! [length]
     logical :: yes
-    ! positive if the vector is less than half a turn after the first end of the arc, or before its last end
+    ! Cross products. `after_first` is positive if the vector is less than half a turn counter-clockwise of the first end of the
+    ! arc. `before_last` is positive if the last end is less than half a turn counter-clockwise of the vector.
     real(real64) :: after_first, before_last
 
     associate (first => self%end_direction(:, 1), last => self%end_direction(:, 2))
@@ -121,9 +122,9 @@ contains
     point = self%centre + self%radius*self%end_direction(:, k)
   end function end_point
 
-  !> Tangential velocity of the surface at a point of contact, if the surface moves counter-clockwise along the arc with unit speed.
-  !> The result is the unit tangent vector of the circle at the nearest point of the arc, without its component along the normal of
-  !> the surface. At the ends of the arc the surface therefore moves more slowly than between the ends.
+  !> Tangential velocity of the surface at a point of contact, if it moves counter-clockwise along the arc with unit speed: the unit
+  !> tangent vector of the circle at the nearest point of the arc, without its component along the surface normal. The ends of the
+  !> arc therefore move more slowly than the rest.
   pure function direction(self, d, normal) result(along)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), normal(2)
@@ -169,10 +170,9 @@ contains
 
   contains
 
-    !> Time until the disk touches the outer or the inner face of the arc. At a contact with a face, the centre of the disk is on a
-    !> circle of the radius `rho`. A point at which the path of the centre crosses the circle is a contact only if the point is
-    !> between the first and the last angle of the arc, and on the same side of the arc as the face. A disk on the other side of the
-    !> arc can cross the circle without touching the face.
+    !> Time until the disk touches the outer or the inner face of the arc. At a contact its centre is on a circle of the radius
+    !> `rho`, between the first and the last angle of the arc, and on the same side of the arc as the face; on the other side, a
+    !> disk can cross the circle without touching the face.
     pure function time_to_face(rho, inside) result(t)
       real(real64), intent(in) :: rho           !! radius of the circle [length]
       logical, intent(in) :: inside             !! .true. for the inner face
@@ -193,10 +193,9 @@ contains
       t = never
     end function time_to_face
 
-    !> Whether a disk on a straight path moves away from a point, or moves perpendicular to the direction of the point within
-    !> rounding errors. A disk that moves away from the centre of a circle does not collide with the circle from outside, even if
-    !> the disk touches the circle. Without this test, rounding errors after a collision could cause a second collision with the
-    !> same face or end of the arc.
+    !> Whether a disk on a straight path moves away from a point or, within rounding errors, perpendicular to the direction of the
+    !> point. A disk moving away from the centre of a circle cannot collide with it from outside; without this test, rounding errors
+    !> could cause a second collision with the same face or end of the arc.
     pure function grazes(from) result(yes)
       real(real64), intent(in) :: from(2)       !! vector from the point to the centre of the disk [length]
       logical :: yes
@@ -218,8 +217,8 @@ contains
     end if
   end function gap
 
-  !> Unit vector from the point of contact on the arc to the centre of a disk that touches the arc. A disk in the opening between
-  !> the two ends of an arc can touch both ends at the same time.
+  !> Unit vector from the point of contact on the arc to the centre of a disk that touches the arc.
+  !> A disk in the opening of an arc can touch both ends at the same time.
   pure function normal(self, d, heading) result(direction)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -245,8 +244,8 @@ contains
     end do
   end function normal
 
-  !> Whether a disk whose centre is in a rectangle can touch the arc. The test uses the bounding rectangle of the arc, and the ring
-  !> that contains the centres of all disks that touch the full circle.
+  !> Whether a disk centred in a rectangle can touch the arc. The test uses the bounding rectangle
+  !> of the arc, and the ring of the centres of all disks that touch the full circle.
   pure function reaches(self, d, half, radius) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -260,9 +259,9 @@ contains
       magnitude(abs(c) + half) >= self%radius - radius - slack
   end function reaches
 
-  !> Whether the arc excludes the centres of disks from a whole rectangle. The distances of the middle and of any other point of the
-  !> rectangle from the arc differ by at most half the diagonal of the rectangle. For a large rectangle the result may be .false.
-  !> although the arc excludes the centres of disks from the whole rectangle.
+  !> Whether the arc excludes the centres of disks from a whole rectangle. Distances from the arc differ by at most half the
+  !> diagonal between the middle and any other point of the rectangle. For a large rectangle the result may be .false. although the
+  !> arc excludes it completely.
   pure function covers(self, d, half, radius) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -271,8 +270,8 @@ contains
     yes = self%gap(d, radius) + magnitude(half) < 0
   end function covers
 
-  !> Checks that the arc overlaps the box. Along a periodic axis, the arc must not be wider than the box, and its middle must be in
-  !> the box, so that images of the arc that are shifted by more than one period do not touch disks in the box.
+  !> Checks that the arc overlaps the box. Along a periodic axis it must not be wider than the box, and its middle must be in the
+  !> box; otherwise images shifted by more than one period could touch disks in the box.
   pure function misfit(self, lower, upper, periodic) result(problem)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: lower(2), upper(2)

@@ -1,4 +1,4 @@
-!> Circular obstacles. The disks are either outside of a circular obstacle or inside the circle.
+!> Circular obstacles, with the disks either outside or inside.
 module circles
   use free_flight, only: time_to_circle
   use images, only: images_t
@@ -23,7 +23,7 @@ module circles
 
 contains
 
-  !> Creates the circle with the given centre and radius. If `encloses` is .true., the disks are inside the circle.
+  !> Creates a circle. If `encloses` is .true., the disks are inside.
   pure function new_circle(centre, radius, encloses) result(circle)
     real(real64), intent(in) :: centre(2)       !! [length]
     real(real64), intent(in) :: radius          !! [length]
@@ -40,9 +40,10 @@ contains
     circle%area = pi*radius**2
   end function new_circle
 
-  !> Vector to the point x from the middle of the nearest periodic image of the circle. Circles that enclose disks have no images.
-  !> If x is at equal distances from two images, a disk at x may touch both images. Between two equally distant images, the function
-  !> chooses the image for which the result and the vector `heading` have the same sign along the axis of the period.
+  !> Vector to the point x from the middle of the nearest periodic image of the circle. Circles that
+  !> enclose disks have no images. If two images are equally close, a disk at x may touch both; the
+  !> image is then chosen for which the result has the same sign as the vector `heading` along the
+  !> periodic axis.
   pure function from_nearest(self, x, images, heading) result(d)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -61,7 +62,7 @@ contains
     end do
   end function from_nearest
 
-  !> Distance between the centre of the circle and the centre of a disk that touches the circle.
+  !> Distance between the centre of the circle and that of a disk that touches it.
   pure function distance_at_contact(self, radius) result(rho)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: radius          !! radius of the disk [length]
@@ -90,8 +91,8 @@ contains
     if (self%encloses) length = -length
   end function gap
 
-  !> Unit vector from the point of contact on the circle to the centre of a disk that touches the circle. The argument `heading` is
-  !> used only at the centre of the circle; elsewhere a disk touches the circle at one point.
+  !> Unit vector from the point of contact on the circle to the centre of a disk that touches it.
+  !> `heading` matters only at the centre of the circle; elsewhere the point of contact is unique.
   pure function normal(self, d, heading) result(direction)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2)

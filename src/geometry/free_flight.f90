@@ -1,19 +1,20 @@
-!> Kinematics of free flight: the position of a disk after a given time, and the time until a disk touches a line or a circle. All
-!> times are measured from the time at which the disk has the position and velocity that are passed as arguments. The module
-!> `neighbour_search` predicts the contacts of two disks.
+!> Kinematics of free flight: the position of a disk after a given time, and the time until it
+!> touches a line or a circle, both measured from the time of the given position and velocity. For
+!> disk-disk contacts see `neighbour_search`.
 module free_flight
   use kinds, only: never, real64
   implicit none
   private
   public :: flight, flight_velocity, time_to_line, time_to_circle, later_time_to_circle, slowest
 
-  !> Largest speed that is treated as zero, because contact times would overflow. [length/time]
+  !> Largest speed treated as zero, because contact times would overflow [length/time]
   real(real64), parameter :: slowest = 1/never
 
-  !> Relative safety margin, larger than all rounding errors, of tests that exclude contacts. With the margin, a test accepts every
-  !> contact that occurs, and possibly some contacts that do not occur.
+  !> Relative safety margin, larger than all rounding errors, of tests that rule out contacts. Such
+  !> a test never rules out a contact that occurs, but may fail to rule out one that does not.
   real(real64), parameter :: spare = 1.0e-6_real64
-  !> Largest number of times that a time interval is halved to find a lower bound of the distance in each part of the interval.
+  !> Largest number of times that a time interval is halved to find a lower bound of the distance in
+  !> each part of it.
   integer, parameter :: most_halvings = 3
 
 contains
@@ -37,8 +38,8 @@ contains
     then = v + g*s
   end function flight_velocity
 
-  !> Time until a point crosses a line in the forward direction; the result is `never` if the point does not cross the line. Each
-  !> branch calculates the root of a quadratic equation by the formula that avoids cancellation.
+  !> Time until a point crosses a line in the forward direction; `never` if it does not. Each branch
+  !> calculates the root of the quadratic equation by the formula that avoids cancellation.
   pure function time_to_line(distance, speed, acceleration) result(s)
     real(real64), intent(in) :: distance  !! distance to the line, negative if the line is behind the point [length]
     real(real64), intent(in) :: speed         !! velocity component towards the line [length/time]
@@ -63,9 +64,9 @@ contains
     end if
   end function time_to_line
 
-  !> Time until the centre of a disk reaches a circle of radius rho around the origin, from inside if `inside` is .true., otherwise
-  !> from outside. If the centre is already on the circle (or beyond the circle because of rounding) and would cross the circle, the
-  !> result is 0.
+  !> Time until the centre of a disk reaches a circle of radius rho around the origin, from inside
+  !> if `inside` is .true., otherwise from outside; 0 if the centre is already on the circle, or
+  !> beyond it owing to rounding, and would cross it.
   pure function time_to_circle(d, v, g, rho, inside, within) result(s)
     real(real64), intent(in) :: d(2)      !! centre of the disk relative to the centre of the circle [length]
     real(real64), intent(in) :: v(2)      !! [length/time]
@@ -89,8 +90,9 @@ contains
     disc = rho*rho*speed2 - (d(1)*v(2) - d(2)*v(1))**2
     if (inside) then
       if (.not. speed2 > 0) return
-      ! Inside the circle this form has no cancellation. If a disk moves along the circle, b and c consist of rounding errors, and
-      ! the other form of the discriminant can vanish; the contact time, about 0, would then be the ratio of two rounding errors.
+      ! Inside the circle this form is free of cancellation. If a disk moves along the circle, b and
+      ! c are rounding errors, and the other form of the discriminant can vanish; the contact time,
+      ! about 0, would then be the ratio of two rounding errors.
       if (c < 0) disc = b*b - speed2*c
       disc = sqrt(max(disc, 0.0_real64))
       if (b > 0) then
@@ -103,10 +105,11 @@ contains
     end if
   end function time_to_circle
 
-  !> Whether an accelerated point certainly does not enter a circle around the origin during a given time. The point may be on the
-  !> circle at the start. The squared distance of the point from the origin minus the squared radius is a quartic polynomial in
-  !> time. In a time interval, the value of a polynomial is never smaller than the smallest of its Bernstein coefficients. The
-  !> Bernstein coefficients converge to the values of the polynomial when the interval is halved repeatedly.
+  !> Whether an accelerated point is certain not to enter a circle around the origin during a given
+  !> time, although it may start on the circle. Its squared distance from the origin minus the
+  !> squared radius is a quartic polynomial in time, whose values in an interval are never below the
+  !> smallest of its Bernstein coefficients. As the interval is halved repeatedly, the coefficients
+  !> converge to these values.
   pure function misses_circle(d, v, g, rho, within) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), rho, within
     logical :: yes
@@ -128,8 +131,9 @@ contains
 
   contains
 
-    !> Whether the quartic polynomial with the given Bernstein coefficients is certainly positive in the whole interval. If
-    !> `from_start` is .true., the polynomial may be 0 or negative at the start of the interval.
+    !> Whether the quartic polynomial with the given Bernstein coefficients is certain to be
+    !> positive in the whole interval. If `from_start` is .true., it may be 0 or negative at the
+    !> start of the interval.
     pure recursive function is_positive(c, from_start, halvings) result(yes)
       real(real64), intent(in) :: c(0:4)
       logical, intent(in) :: from_start
@@ -148,8 +152,9 @@ contains
     end function is_positive
   end function misses_circle
 
-  !> Like `time_to_circle`, but the given number of earlier contacts is skipped. The point passes through the circle at each skipped
-  !> contact. A straight path crosses a circle at most once inwards and once outwards.
+  !> Version of `time_to_circle` that skips a given number of earlier contacts, at which the point
+  !> passes through the circle. A straight path crosses a circle at most once inwards and once
+  !> outwards.
   pure function later_time_to_circle(d, v, g, rho, inside, skipped) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside
@@ -160,11 +165,12 @@ contains
     if (any(abs(g) > 0)) s = time_to_circle_falling(d, v, g, rho, inside, skipped)
   end function later_time_to_circle
 
-  !> Like `time_to_circle`, but for a disk on a parabolic path. The function F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic
-  !> polynomial, which is 0 at a contact. F is monotonic between the roots of its derivative F', and F' is monotonic between the
-  !> roots of its derivative F''. Bisection therefore starts with an interval that contains exactly one root, and the first contact
-  !> cannot be missed. F is calculated from the position at the time s and not from polynomial coefficients, because rounding errors
-  !> of the coefficients could exceed the squared radius of a small circle.
+  !> Version of `time_to_circle` for parabolic paths. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a
+  !> quartic polynomial that vanishes at a contact. F is monotonic between the roots of its
+  !> derivative F', and F' between the roots of F''. Bisection therefore starts with an interval
+  !> that contains exactly one root, and the first contact cannot be missed. F is calculated from
+  !> the position at the time s and not from polynomial coefficients, whose rounding errors could
+  !> exceed the squared radius of a small circle.
   pure function time_to_circle_falling(d, v, g, rho, inside, skipped) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside
@@ -204,7 +210,7 @@ contains
 
   contains
 
-    !> The function F, or -F if the disk is inside the circle. At a contact the value of `apart` changes from positive to negative.
+    !> F, or -F if the disk is inside the circle: it changes from positive to negative at a contact.
     pure function apart(s) result(f)
       real(real64), intent(in) :: s
       real(real64) :: f, x(2)
@@ -214,8 +220,9 @@ contains
       if (inside) f = -f
     end function apart
 
-    !> Latest representable time before a contact, if the centre of the disk crosses the circle exactly once between the times lo
-    !> and hi. The bisection uses the distance from the origin, which is more precise than the coefficients of the polynomial.
+    !> Latest representable time before a contact, if the centre of the disk crosses the circle
+    !> exactly once between the times lo and hi. The bisection uses the distance from the origin,
+    !> which is more precise than the coefficients of the polynomial.
     pure function last_apart(lo, hi) result(left)
       real(real64), intent(in) :: lo, hi
       real(real64) :: left, middle, right, x(2)
@@ -235,9 +242,9 @@ contains
     end function last_apart
   end function time_to_circle_falling
 
-  !> A power of two that is larger than all roots of a cubic polynomial (Fujiwara's bound) and larger than the square root of
-  !> `time2`. The argument `time2` determines the bound if all roots are zero. Because the bound is a power of two, a change of
-  !> units by a factor that is a power of two scales all results exactly.
+  !> A power of two that exceeds all roots of a cubic polynomial (Fujiwara's bound) and the square
+  !> root of `time2`, which matters if all roots are zero. A power of two ensures that a change of
+  !> units by another power of two scales all results exactly.
   pure function root_bound(cubic, time2) result(bound)
     real(real64), intent(in) :: cubic(0:3), time2
     real(real64) :: bound
@@ -250,8 +257,8 @@ contains
     bound = scale(2.0_real64, power)
   end function root_bound
 
-  !> Root of a cubic polynomial in the interval from lo to hi, in which the polynomial must change its sign exactly once. The root
-  !> is found by bisection to the last bit.
+  !> Root of a cubic polynomial in the interval from lo to hi, in which it must change sign exactly
+  !> once, found by bisection to the last bit.
   pure function root_between(cubic, lo, hi) result(s)
     real(real64), intent(in) :: cubic(0:3), lo, hi
     real(real64) :: s, left, right

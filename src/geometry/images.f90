@@ -1,9 +1,10 @@
-!> Displacements and velocities of the periodic images of the box. The module `images` is used in the neighbour search, in the
-!> placement of disks, for obstacles and in collisions.
+!> Displacements and velocities of the periodic images of the box, for the neighbour search, the
+!> placement of disks, obstacles and collisions.
 !>
-!> In a sheared box (Lees and Edwards, 1972, doi:10.1088/0022-3719/5/15/006) the image above the box moves along x. The position of
-!> an image of the box depends only on the time, because the image has a constant velocity. The separation between a disk and an
-!> image of another disk therefore depends only on the states of the two disks and on the time.
+!> In a sheared box (Lees and Edwards, 1972, doi:10.1088/0022-3719/5/15/006) the image above the box
+!> moves along x at constant velocity, so its position depends only on the time. The separation
+!> between a disk and an image of another disk therefore depends only on the states of the two disks
+!> and on the time.
 module images
   use kinds, only: never, real64
   implicit none
@@ -16,8 +17,8 @@ module images
     real(real64) :: velocity = 0.0_real64       !! velocity of the image along x [length/time]
   end type image_t
 
-  !> All periodic images of the box. Each image is identified by two indices, one along each axis. The image (0, 0) is the box
-  !> itself, and the image (0, 1) is above the box. The indices of an image are whole numbers stored as reals, because two disks may
+  !> All periodic images of the box, each identified by two indices: (0, 0) is the box itself, and
+  !> (0, 1) the image above it. The indices are whole numbers stored as reals, because two disks may
   !> be any number of periods apart.
   type :: images_t
     real(real64) :: period(2) = never           !! edges of the box; set to `never` along an axis with walls [length]
@@ -38,9 +39,10 @@ module images
 
 contains
 
-  !> Creates the images of a box. The procedures of the type `images_t` measure times from the time origin `epoch`. At the time t of
-  !> the run, the image above the box is displaced along x by velocity*t. The displacement is reduced modulo the period without
-  !> rounding errors, so that the precision does not decrease at late times.
+  !> Creates the images of a box, for times measured from the time origin `epoch`. At the time t of
+  !> the run, the image above the box is displaced along x by velocity*t. This displacement is
+  !> reduced modulo the period without rounding errors, so that the precision does not decrease at
+  !> late times.
   pure function moving_images(period, velocity, epoch) result(images)
     real(real64), intent(in) :: period(2)       !! [length]
     real(real64), intent(in) :: velocity        !! [length/time]
@@ -59,8 +61,8 @@ contains
     end associate
   end function moving_images
 
-  !> Splits a number into two parts whose sum is the number. Each part has at most 27 significant binary digits; the product of a
-  !> part of one number and a part of another number is therefore exact.
+  !> Splits a number into two parts that add up to it. Each part has at most 27 significant binary
+  !> digits, so the product of two parts is exact.
   pure function halves(x)
     real(real64), intent(in) :: x
     real(real64) :: halves(2)
@@ -70,7 +72,7 @@ contains
     halves(2) = x - halves(1)
   end function halves
 
-  !> Number of images in which a search must look for collision partners (see `reach`), including the box itself.
+  !> Number of images to be searched for collision partners (see `reach`), including the box itself.
   pure function count_around(self) result(n)
     class(images_t), intent(in) :: self
     integer :: n
@@ -78,8 +80,9 @@ contains
     n = product(2*self%reach() + 1)
   end function count_around
 
-  !> Largest index, along each axis, of the images in which a search must look for collision partners. Until the time `valid_until`,
-  !> a disk in the box can touch only disks in images whose indices are at most `reach`, provided that no disk leaves the box.
+  !> Largest index, along each axis, of the images to be searched for collision partners. Until the
+  !> time `valid_until`, a disk in the box can touch only disks in these images, provided that no
+  !> disk leaves the box.
   pure function reach(self)
     class(images_t), intent(in) :: self
     integer :: reach(2)
@@ -88,7 +91,8 @@ contains
     if (abs(self%velocity) > 0) reach(1) = 2
   end function reach
 
-  !> Indices of the k-th image in which a search must look for collision partners; the images are numbered row by row.
+  !> Indices of the k-th image to be searched for collision partners; the images are numbered row by
+  !> row.
   pure function around(self, k, now) result(number)
     class(images_t), intent(in) :: self
     integer, intent(in) :: k                    !! number of the image, starting at 1
@@ -114,9 +118,9 @@ contains
     displacement = rows*(self%offset + self%velocity*now)
   end function displacement
 
-  !> Time at which the image above the box will have moved by `distance` from its present position; the result is `never` if the
-  !> images do not move. Until the image has moved by `distance`, a search can use the present result of `around`, provided that the
-  !> search allows for displacements of the images of up to `distance`.
+  !> Time at which the image above the box will have moved by `distance` from its present position;
+  !> `never` if the images do not move. Until then a search can use the present result of `around`,
+  !> provided that it allows for displacements of up to `distance`.
   pure function valid_until(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]
@@ -129,8 +133,8 @@ contains
     if (abs(self%velocity) > farthest/never) t = now + farthest/abs(self%velocity)
   end function valid_until
 
-  !> Indices of the image that contains the nearest copy of an object, where dx is the separation from the object itself. In almost
-  !> all calls the nearest image is the box itself, and the result is (0, 0).
+  !> Indices of the image that contains the nearest copy of an object, where dx is the separation
+  !> from the object itself. Nearly always this is the box itself, with the indices (0, 0).
   pure function nearest_image(self, dx, now) result(number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: dx(2)           !! [length]
@@ -163,15 +167,15 @@ contains
     image = image_t(self%shift(number), number(2)*self%velocity)
   end function image
 
-  !> Transforms the state of a disk into the reference frame of the image that is `rows` periods above the box. The procedure
-  !> changes only the coordinates and velocity components of the disk, not the physical state of the disk.
+  !> Transforms the state of a disk into the reference frame of the image that is `rows` periods
+  !> above the box. Only the coordinates and velocity components change, not the physical state.
   pure subroutine enter_image_frame(self, rows, clock, x, v, periods)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
     real(real64), intent(in) :: clock           !! time at which the disk is at the position x [time]
     real(real64), intent(inout) :: x(2)         !! [length]
     real(real64), intent(inout) :: v(2)         !! [length/time]
-    real(real64), intent(inout) :: periods(2)  !! number of periods that the disk has moved along each axis
+    real(real64), intent(inout) :: periods(2)  !! image counters of the disk, which are updated
 
     x = x - [self%displacement(rows, clock), rows*self%period(2)]
     v(1) = v(1) - rows*self%velocity

@@ -1,9 +1,11 @@
-!> Straight walls between two points, impenetrable from both sides. Disks also collide with the ends of a wall.
+!> Straight walls between two points, impenetrable from both sides. Disks also collide with the ends
+!> of a wall.
 !>
-!> A disk touches a wall when the centre of the disk reaches the stadium around the wall. The stadium consists of two straight
-!> sides, parallel to the wall at a distance equal to the radius of the disk, and of two half circles around the ends of the wall.
-!> The stadium is convex, and the centre of a disk can therefore reach a straight side only from outside. If rounding errors hide a
-!> contact with a straight side near an end of the wall, the contact with the half circle around the end is found instead.
+!> A disk touches a wall when its centre reaches the stadium around the wall. The stadium consists
+!> of two straight sides, parallel to the wall at a distance equal to the radius of the disk, and of
+!> two half circles around the ends. It is convex, so the centre of a disk can reach a straight side
+!> only from outside. If rounding errors hide a contact with a straight side near an end of the
+!> wall, the contact with the half circle is found instead.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use kinds, only: never, real64
@@ -42,9 +44,9 @@ contains
     if (segment%length > 0) segment%along = segment%half/segment%length
   end function new_segment
 
-  !> Tangential velocity of the surface at a point of contact, if the surface moves along the wall with unit speed. The result is
-  !> the unit vector along the wall without its component along the normal of the surface. At the ends of the wall the surface
-  !> therefore moves more slowly than between the ends.
+  !> Tangential velocity of the surface at a point of contact, if the surface moves along the wall
+  !> with unit speed: the unit vector along the wall, without its component along the normal of the
+  !> surface. At the ends of the wall the surface therefore moves more slowly than between them.
   pure function direction(self, d, normal) result(along)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -71,9 +73,9 @@ contains
 
   contains
 
-    !> Time until the centre of a disk reaches one straight side of the stadium around the wall, the side in the direction `across`.
-    !> The result is `never` if the centre passes beyond an end of the wall. The centre reaches a straight side from outside at most
-    !> once, because the distance is a quadratic function of time.
+    !> Time until the centre of a disk reaches the straight side of the stadium in the direction
+    !> `across`; `never` if it passes beyond an end of the wall. The distance is a quadratic
+    !> function of time, so the side is reached from outside at most once.
     pure function time_to_side() result(t)
       real(real64) :: t, away, speed, fall, disc
 
@@ -84,7 +86,7 @@ contains
       t = never
       if (away >= 0) then
         t = time_to_line(away, speed, fall)
-      else if (fall > 0 .and. speed < 0) then     ! the disk rises beyond an end of the wall and may fall back onto the wall
+      else if (fall > 0 .and. speed < 0) then     ! the disk rises beyond an end of the wall and may fall back onto it
         disc = speed**2 + 2*fall*away
         if (disc >= 0) t = (sqrt(disc) - speed)/fall
       end if
@@ -113,9 +115,10 @@ contains
     length = sqrt(dot_product(offset, offset)) - radius
   end function gap
 
-  !> Unit vector from the point of contact on the wall to the centre of a disk that touches the wall. Between the ends of the wall
-  !> the result is exactly the normal of the wall, without rounding errors even for very small disks. The argument `heading` is used
-  !> only at an end of the wall; elsewhere a disk touches a straight wall at one point.
+  !> Unit vector from the point of contact on the wall to the centre of a disk that touches it.
+  !> Between the ends it is exactly the normal of the wall, without rounding errors even for very
+  !> small disks. `heading` is used only at an end of the wall; elsewhere a disk touches the wall at
+  !> one point.
   pure function normal(self, d, heading) result(direction)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -130,8 +133,8 @@ contains
     end if
   end function normal
 
-  !> Whether a disk whose centre is in a rectangle can touch the wall. The test looks for a separating axis, and replaces the disk
-  !> by a square of the same width.
+  !> Whether a disk centred in a rectangle can touch the wall. The test looks for a separating axis,
+  !> and replaces the disk by a square of the same width.
   pure function reaches(self, d, half, radius) result(yes)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -144,8 +147,8 @@ contains
       abs(dot_product(d, across)) <= dot_product(room, abs(across)) + spare*sqrt(dot_product(d, d))
   end function reaches
 
-  !> Whether the wall excludes the centres of disks from a whole rectangle. The stadium around the wall is convex; it is therefore
-  !> sufficient to test the corners of the rectangle.
+  !> Whether the wall excludes the centres of disks from a whole rectangle. Since the stadium around
+  !> the wall is convex, it is enough to test the corners of the rectangle.
   pure function covers(self, d, half, radius) result(yes)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius

@@ -1,6 +1,6 @@
-!> Interface of fixed obstacles of all shapes. The neighbour search, the placement of disks, time-stepped dynamics and the
-!> observables use only the interface `shape_t`, and therefore do not depend on whether an obstacle is a circle, an arc or a
-!> straight wall.
+!> Interface of fixed obstacles of all shapes. The neighbour search, the placement of disks,
+!> time-stepped dynamics and the observables use only `shape_t`, whether an obstacle is a circle, an
+!> arc or a straight wall.
 module shapes
   use images, only: images_t
   use kinds, only: real64
@@ -8,8 +8,8 @@ module shapes
   private
   public :: shape_t, magnitude, spare, unit_vector
 
-  !> Relative safety margin, larger than all rounding errors. If rounding errors make the result of a test uncertain, the margin
-  !> ensures that the test returns the result with which no contact is missed.
+  !> Relative safety margin, larger than all rounding errors. Where rounding errors make a test
+  !> uncertain, the margin selects the result with which no contact is missed.
   real(real64), parameter :: spare = 1.0e-6_real64
 
   !> The outline of an obstacle. All points are relative to the middle of the obstacle.
@@ -17,7 +17,7 @@ module shapes
     real(real64) :: middle(2) = 0.0_real64      !! [length]
     logical :: encloses = .false.               !! .true. if the disks are inside the obstacle, .false. if they are outside
     logical :: is_round = .false.               !! .true. if the outline is a circle and the disks are outside
-    !> Whether a disk that leaves the outline on a straight path cannot touch the outline again
+    !> Whether a disk that leaves the outline on a straight path cannot touch it again
     logical :: is_convex = .true.
     real(real64) :: extent(2) = 0.0_real64      !! half width and half height of the bounding rectangle [length]
     real(real64) :: circumradius = 0.0_real64   !! largest distance of a point of the outline from the middle [length]
@@ -35,8 +35,9 @@ module shapes
   end type shape_t
 
   abstract interface
-    !> Time until the boundary of a disk touches the outline. The result is 0 if the disk already touches the outline (or overlaps
-    !> the outline because of rounding) and moves towards the outline. The result is `never` if there is no contact.
+    !> Time until the rim of a disk touches the outline; `never` if there is no contact. The result
+    !> is 0 if the disk already touches the outline (or overlaps it owing to rounding) and is moving
+    !> towards it.
     pure function contact_time(self, d, v, g, radius, within) result(s)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -48,7 +49,7 @@ module shapes
       real(real64) :: s
     end function contact_time
 
-    !> Shortest distance between the outline and the boundary of a disk; negative if the disk overlaps the outline.
+    !> Shortest distance between the outline and the rim of a disk; negative if they overlap.
     pure function gap(self, d, radius) result(length)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -56,9 +57,10 @@ module shapes
       real(real64) :: length
     end function gap
 
-    !> Unit vector from the point of contact on the outline to the centre of a disk that touches the outline. If the disk touches
-    !> the outline at several points, the function chooses the point whose normal has the smallest angle to the vector `heading`.
-    !> The result is a unit vector even if the centre of the disk is on the outline or at the centre of a circle.
+    !> Unit vector from the point of contact on the outline to the centre of a disk that touches it.
+    !> Of several contact points, the one is chosen whose normal has the smallest angle to the
+    !> vector `heading`. The result is a unit vector even if the centre of the disk is on the
+    !> outline or at the centre of a circle.
     pure function normal(self, d, heading) result(direction)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -67,8 +69,8 @@ module shapes
       real(real64) :: direction(2)
     end function normal
 
-    !> Whether a disk whose centre is in the rectangle d +- half can touch the outline. If rounding errors make the answer
-    !> uncertain, the result is .true.
+    !> Whether a disk centred in the rectangle d +- half can touch the outline; .true. if rounding
+    !> errors make this uncertain.
     pure function reaches(self, d, half, radius) result(yes)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -76,8 +78,9 @@ module shapes
       logical :: yes
     end function reaches
 
-    !> Whether the obstacle excludes the centres of disks from the whole rectangle d +- half. If rounding errors make the answer
-    !> uncertain, the result is .false.; for a single point (half = 0) the result is exact.
+    !> Whether the obstacle excludes the centres of disks from the whole rectangle d +- half;
+    !> .false. if rounding errors make this uncertain. For a single point (half = 0) the result is
+    !> exact.
     pure function covers(self, d, half, radius) result(yes)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -85,7 +88,7 @@ module shapes
       logical :: yes
     end function covers
 
-    !> Reports why the obstacle does not fit into a box, as `variable: problem`. The text is empty if the obstacle fits.
+    !> Reason why the obstacle does not fit into a box, as `variable: problem`; empty if it fits.
     pure function misfit(self, lower, upper, periodic) result(problem)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -97,8 +100,9 @@ module shapes
 
 contains
 
-  !> Length of a vector. If the vector is multiplied by a power of two, the result is multiplied by exactly the same power of two.
-  !> The function `norm2` of gfortran is not used, because `norm2` scales the vector and thereby introduces rounding errors.
+  !> Length of a vector. Multiplying the vector by a power of two multiplies the result by exactly
+  !> the same power. The `norm2` of gfortran, which scales the vector, would introduce rounding
+  !> errors.
   pure function magnitude(v)
     real(real64), intent(in) :: v(2)
     real(real64) :: magnitude
@@ -106,9 +110,9 @@ contains
     magnitude = sqrt(v(1)*v(1) + v(2)*v(2))
   end function magnitude
 
-  !> Unit vector in the direction of v. If v vanishes, its direction is undetermined, and the result has the direction of
-  !> `otherwise`. This occurs at the centre of a container that is hardly larger than a disk, and where a disk in a time-stepped
-  !> simulation stops exactly on an obstacle.
+  !> Unit vector in the direction of v or, if v vanishes, of `otherwise`. This occurs at the centre
+  !> of a container hardly larger than a disk, and where a disk in a time-stepped simulation stops
+  !> exactly on an obstacle.
   pure function unit_vector(v, otherwise) result(e)
     real(real64), intent(in) :: v(2)
     real(real64), intent(in), optional :: otherwise(2)  !! the x direction, if absent or 0
@@ -124,10 +128,11 @@ contains
     if (magnitude(otherwise) > shortest) e = otherwise/magnitude(otherwise)
   end function unit_vector
 
-  !> Vector to the point x from the middle of the nearest periodic image of the obstacle. The distances of x from the outlines of
-  !> all images are compared, because the nearest image of a long wall is not always the image whose middle is nearest to x. If x is
-  !> at equal distances from two images, a disk at x may touch both images. Between two equally distant images, the function chooses
-  !> the image whose normal has the smallest angle to the vector `heading`.
+  !> Vector to the point x from the middle of the nearest periodic image of the obstacle. The
+  !> distances of x from the outlines of all images are compared, because the nearest image of a
+  !> long wall is not always the one whose middle is nearest. If x is at equal distances from two
+  !> images, a disk at x may touch both; the function then chooses the image whose normal has the
+  !> smallest angle to the vector `heading`.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -153,8 +158,8 @@ contains
     end do
   end function from_nearest
 
-  !> Unit tangent vector at the point of contact with a disk. The tangent vector points counter-clockwise around the middle of the
-  !> obstacle.
+  !> Unit tangent vector at the point of contact with a disk, pointing counter-clockwise around the
+  !> middle of the obstacle.
   pure function direction(self, d, normal) result(along)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: d(2)            !! vector from the middle of the obstacle to the centre of the disk [length]
@@ -165,7 +170,7 @@ contains
     if (self%encloses) along = -along
   end function direction
 
-  !> Whether the outline is concave where a disk touches the outline, so that the disk can slide along the outline.
+  !> Whether the outline is concave where a disk touches it, so that the disk can slide along it.
   pure function is_concave_at(self, d) result(yes)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: d(2)            !! vector from the middle of the obstacle to the centre of the disk [length]

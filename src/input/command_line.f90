@@ -1,4 +1,5 @@
-!> Reads the command line, with file names of any length, and prints the information that --help and similar options request.
+!> Reads the command line, with file names of any length, and prints the information requested by
+!> --help and similar options.
 module command_line
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use build_info, only: build_flags, git_commit
@@ -27,6 +28,21 @@ module command_line
     logical :: force = .false.                     !! .true.: replace a finished or unfinished output
   end type command_t
 
+  !> Parser of the command line.
+  type :: parser_t
+    type(text_t), allocatable :: arguments(:)
+    integer :: k = 0                               !! index of the argument that is being read
+    type(command_t) :: command
+    type(error_t), allocatable :: error
+  contains
+    procedure :: take_all
+    procedure :: take_option
+    procedure :: take_value
+    procedure :: expect_assignment
+    procedure :: report_unknown
+    procedure :: refuse
+  end type parser_t
+
   character(len=17), parameter :: switches(*) = [character(len=17) :: "--resume", "--check", "--quiet", "--force", &
     "--help", "--version", "--print-defaults", "--print-variables", "--print-input"]
   character(len=17), parameter :: options(*) = [character(len=17) :: "--output", "--set", "--explain", switches]
@@ -48,129 +64,149 @@ contains
     call parse_arguments(arguments, command, error)
   end subroutine read_command_line
 
-  !> Converts the arguments to a command, or reports the first invalid argument. Arguments after an option such as --help, which
-  !> only prints information, are not read.
+  !> Converts the arguments to a command, or reports the first invalid argument.
   subroutine parse_arguments(arguments, command, error)
     type(text_t), intent(in) :: arguments(:)
     type(command_t), intent(out) :: command
     type(error_t), allocatable, intent(out) :: error
-    logical :: only_files
-    integer :: k
+    type(parser_t) :: parser
 
-    command%question = ""
-    command%input = ""
-    command%output = ""
-    allocate (command%overrides(0))
-    only_files = .false.
-    k = 0
-    do while (k < size(arguments) .and. command%question == "")
-      k = k + 1
-      associate (argument => arguments(k)%text)
-        if (.not. only_files .and. argument == "--") then
-          only_files = .true.
-        else if (.not. only_files .and. index(argument, "-") == 1) then
-          call take_option(argument(:merge(index(argument//"=", "=") - 1, len(argument), index(argument, "--") == 1)))
-        else if (command%input == "" .and. argument /= "") then
-          command%input = argument
-        else if (argument == "") then
-          call refuse("the name of the input file is empty")
-        else
-          call refuse("only one input file is allowed; there is also "//shown(argument))
-        end if
-      end associate
-      if (allocated(error)) return
-    end do
-    if (command%question /= "") return
-    if (command%input == "") call refuse("no input file is given; usage: ricochet INPUT.nml, see --help")
-    if (command%resume .and. command%force) call refuse("--resume continues a run, --force starts it again; give only one of them")
+    parser%arguments = arguments
+    parser%command%question = ""
+    parser%command%input = ""
+    parser%command%output = ""
+    allocate (parser%command%overrides(0))
+    call parser%take_all()
+    command = parser%command
+    call move_alloc(parser%error, error)
+    if (allocated(error) .or. command%question /= "") return
+    if (command%input == "") then
+      call fail(error, exit_usage, "no input file is given; usage: ricochet INPUT.nml, see --help")
+    else if (command%resume .and. command%force) then
+      call fail(error, exit_usage, "--resume continues a run, --force starts it again; give only one of them")
+    end if
     if (command%output == "") command%output = default_output(command%input)
     if (.not. allocated(error)) call check_name(command%output, error)
-
-  contains
-
-    !> Reports an error in the command line, unless an earlier error has already been reported.
-    subroutine refuse(why)
-      character(len=*), intent(in) :: why
-
-      if (.not. allocated(error)) call fail(error, exit_usage, why)
-    end subroutine refuse
-
-    !> Reads the option in argument k, and also argument k+1 if this argument is the value of the option.
-    subroutine take_option(name)
-      character(len=*), intent(in) :: name
-      type(text_t) :: override
-
-      if (name /= arguments(k)%text .and. any(switches == name)) then
-        call refuse("option "//name//" takes no value")
-        return
-      end if
-      select case (name)
-      case ("-o", "--output")
-        call take_value(name, command%output)
-      case ("--set")
-        call take_value(name, override%text)
-        call expect_assignment(override%text)
-        command%overrides = [command%overrides, override]    ! a constructor `text_t(...)` would leak memory with gfortran 12
-      case ("--explain")
-        command%question = "explain"
-        call take_value(name, command%topic)
-      case ("-h", "--help")
-        command%question = "help"
-      case ("--version", "--print-defaults", "--print-variables")
-        command%question = name(3:)
-      case ("--resume")
-        command%resume = .true.
-      case ("--check")
-        command%check = .true.
-      case ("--print-input")
-        command%print_input = .true.
-      case ("--quiet")
-        command%quiet = .true.
-      case ("--force")
-        command%force = .true.
-      case default
-        call report_unknown(name)
-      end select
-    end subroutine take_option
-
-    !> Reads the value of an option: the text after `=` or, without `=`, the next argument.
-    subroutine take_value(name, value)
-      character(len=*), intent(in) :: name
-      character(len=:), allocatable, intent(out) :: value
-
-      value = arguments(k)%text(min(len(name) + 2, len(arguments(k)%text) + 1):)
-      if (name == arguments(k)%text .and. k < size(arguments)) then
-        k = k + 1
-        value = arguments(k)%text
-      end if
-      if (value == "") call refuse("option "//name//" needs a value")
-    end subroutine take_value
-
-    !> Reports an error for `--set NAME VALUE` (without `=`), because VALUE would be interpreted as a file name.
-    subroutine expect_assignment(text)
-      character(len=*), intent(in) :: text
-
-      if (index(text, "=") > 0 .or. k == size(arguments)) return
-      associate (next => arguments(k + 1)%text)
-        if (index(next, "-") /= 1 .and. index(next//"|", ".nml|") == 0) &
-          call refuse("--set "//text//": = is missing; did you mean --set "//text//"="//next//"?")
-      end associate
-    end subroutine expect_assignment
-
-    !> Reports an unknown option. The message suggests a known option or a file name that the user may have meant.
-    subroutine report_unknown(name)
-      character(len=*), intent(in) :: name
-      character(len=:), allocatable :: meant
-
-      meant = nearest_word(name, options)
-      if (meant == "" .and. index(name, "--") /= 1) meant = nearest_word("-"//name, options)
-      if (meant /= "") meant = "did you mean "//meant//"?"
-      if (meant == "") meant = "see --help; put -- before a file name that begins with -"
-      call refuse("unknown option "//shown(name)//"; "//meant)
-    end subroutine report_unknown
   end subroutine parse_arguments
 
-  !> Default path of the output, in the form runs/NAME.h5, where NAME is the name of the input file.
+  !> Reads the arguments up to the first error, or up to an option that only prints information, such
+  !> as --help.
+  subroutine take_all(self)
+    class(parser_t), intent(inout) :: self
+    character(len=:), allocatable :: argument
+    logical :: only_files
+
+    only_files = .false.
+    do while (self%k < size(self%arguments) .and. self%command%question == "")
+      self%k = self%k + 1
+      argument = self%arguments(self%k)%text
+      if (.not. only_files .and. argument == "--") then
+        only_files = .true.
+      else if (.not. only_files .and. index(argument, "-") == 1) then
+        call self%take_option(argument(:merge(index(argument//"=", "=") - 1, len(argument), index(argument, "--") == 1)))
+      else if (self%command%input == "" .and. argument /= "") then
+        self%command%input = argument
+      else if (argument == "") then
+        call self%refuse("the name of the input file is empty")
+      else
+        call self%refuse("only one input file is allowed; there is also "//shown(argument))
+      end if
+      if (allocated(self%error)) return
+    end do
+  end subroutine take_all
+
+  !> Reports an error in the command line, unless an earlier error has already been reported.
+  subroutine refuse(self, why)
+    class(parser_t), intent(inout) :: self
+    character(len=*), intent(in) :: why
+
+    if (.not. allocated(self%error)) call fail(self%error, exit_usage, why)
+  end subroutine refuse
+
+  !> Reads the option in argument k, with argument k+1 if that is its value.
+  subroutine take_option(self, name)
+    class(parser_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    type(text_t) :: value
+
+    if (name /= self%arguments(self%k)%text .and. any(switches == name)) then
+      call self%refuse("option "//name//" takes no value")
+      return
+    end if
+    select case (name)
+    case ("-o", "--output")
+      call self%take_value(name, value%text)
+      self%command%output = value%text
+    case ("--set")
+      call self%take_value(name, value%text)
+      call self%expect_assignment(value%text)
+      ! a constructor `text_t(...)` would leak memory with gfortran 12
+      self%command%overrides = [self%command%overrides, value]
+    case ("--explain")
+      self%command%question = "explain"
+      call self%take_value(name, value%text)
+      self%command%topic = value%text
+    case ("-h", "--help")
+      self%command%question = "help"
+    case ("--version", "--print-defaults", "--print-variables")
+      self%command%question = name(3:)
+    case ("--resume")
+      self%command%resume = .true.
+    case ("--check")
+      self%command%check = .true.
+    case ("--print-input")
+      self%command%print_input = .true.
+    case ("--quiet")
+      self%command%quiet = .true.
+    case ("--force")
+      self%command%force = .true.
+    case default
+      call self%report_unknown(name)
+    end select
+  end subroutine take_option
+
+  !> Reads the value of an option: the text after `=` or, without `=`, the next argument.
+  subroutine take_value(self, name, value)
+    class(parser_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable, intent(out) :: value
+
+    value = self%arguments(self%k)%text(min(len(name) + 2, len(self%arguments(self%k)%text) + 1):)
+    if (name == self%arguments(self%k)%text .and. self%k < size(self%arguments)) then
+      self%k = self%k + 1
+      value = self%arguments(self%k)%text
+    end if
+    if (value == "") call self%refuse("option "//name//" needs a value")
+  end subroutine take_value
+
+  !> Reports an error for `--set NAME VALUE` (without `=`), in which VALUE would be taken for a
+  !> file name.
+  subroutine expect_assignment(self, text)
+    class(parser_t), intent(inout) :: self
+    character(len=*), intent(in) :: text
+
+    if (index(text, "=") > 0 .or. self%k == size(self%arguments)) return
+    associate (next => self%arguments(self%k + 1)%text)
+      if (index(next, "-") /= 1 .and. index(next//"|", ".nml|") == 0) &
+        call self%refuse("--set "//text//": = is missing; did you mean --set "//text//"="//next//"?")
+    end associate
+  end subroutine expect_assignment
+
+  !> Reports an unknown option, and suggests a known option or a file name that the user may have
+  !> meant.
+  subroutine report_unknown(self, name)
+    class(parser_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: meant
+
+    meant = nearest_word(name, options)
+    if (meant == "" .and. index(name, "--") /= 1) meant = nearest_word("-"//name, options)
+    if (meant /= "") meant = "did you mean "//meant//"?"
+    if (meant == "") meant = "see --help; put -- before a file name that begins with -"
+    call self%refuse("unknown option "//shown(name)//"; "//meant)
+  end subroutine report_unknown
+
+  !> Default path of the output, runs/NAME.h5, where NAME is the name of the input file.
   pure function default_output(input) result(output)
     character(len=*), intent(in) :: input
     character(len=:), allocatable :: output
@@ -182,7 +218,7 @@ contains
     output = "runs/"//output//".h5"
   end function default_output
 
-  !> Prints the information that `command%question` selects.
+  !> Prints the information selected by `command%question`.
   subroutine answer(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error

@@ -1,5 +1,5 @@
-!> Values of the input variables as a run uses them, ordered by group and name. The output file contains the value of every
-!> variable; the module `settings` contains the values as typed data.
+!> Values of the input variables as a run uses them, ordered by group and name. All of them are
+!> stored in the output file; `settings` contains them as typed data.
 module input_groups
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
@@ -12,16 +12,16 @@ module input_groups
   integer, parameter :: text_length = 512      !! longest text value, in bytes
   integer, parameter, public :: most_written = 100      !! largest number of values in an assignment; longer lists are truncated
 
-  !> The value of one variable. Real numbers are stored in `reals`, and all other values in `texts`. An integer is stored as its
-  !> decimal digits, which can represent every 64-bit integer. A logical value is stored as `.true.` or `.false.`. If the variable
-  !> has no value, neither `reals` nor `texts` is allocated.
+  !> The value of one variable: `reals` for real numbers, `texts` for all others. An integer is
+  !> stored as decimal digits, which can represent every 64-bit integer, and a logical as `.true.`
+  !> or `.false.`. Neither array is allocated if the variable has no value.
   type :: value_t
     integer :: row = 0                         !! row of the variable in the table of variables
     character(len=name_length) :: name = ""
     character(len=8) :: kind = ""              !! type of the values, 'integer', 'real', 'logical' or 'text'
     logical :: given = .false.                 !! .true. if the user has set the variable
     logical :: faulty = .false.                !! .true. if the user has set an invalid value, which has been reported
-    !> Number of the line that sets the variable, or the negative integer -k if override number k sets the variable
+    !> Number of the line that sets the variable, or the negative integer -k for override number k
     integer :: line = 0
     integer :: elements = 0                    !! bit mask: bit i is 1 if element i has been set by name(i) = value
     real(real64), allocatable :: reals(:)
@@ -34,8 +34,8 @@ module input_groups
     procedure :: json
   end type value_t
 
-  !> One group of the input, or one instance of a repeated group. Each type-bound function that returns the value of a variable
-  !> returns the argument `otherwise` if the variable has no value.
+  !> One group of the input, or one instance of a repeated group. The functions that return the
+  !> value of a variable return `otherwise` if there is none.
   type :: group_t
     character(len=8) :: name = ""
     character(len=text_length) :: instance = ""  !! name that distinguishes a group that may occur several times; otherwise blank
@@ -85,8 +85,8 @@ contains
     end if
   end function integers
 
-  !> Whether all variables have the same values in two inputs. Variables that the user has not set are compared by their default
-  !> values.
+  !> Whether all variables have the same values in two inputs. Defaults are used for variables that
+  !> are not set.
   pure function same_values(one, other) result(yes)
     type(group_t), intent(in) :: one(:), other(:)  !! groups of the two inputs, in the same order
     logical :: yes
@@ -168,7 +168,7 @@ contains
     end associate
   end function real_of
 
-  !> The first value of a variable of any kind except "real"; an empty text if the variable has no value.
+  !> First value of a variable of any kind except "real"; an empty string if it has no value.
   pure function text_of(self, name) result(text)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -198,7 +198,7 @@ contains
     faulty = self%values(row_of(self%name, name))%faulty
   end function faulty
 
-  !> Stores a text as the value of a variable, after the text has been calculated from other variables.
+  !> Stores a string, calculated from other variables, as the value of a variable.
   pure subroutine put_text(self, name, text)
     class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -211,7 +211,7 @@ contains
     end associate
   end subroutine put_text
 
-  !> Stores real numbers as the values of a variable, after the numbers have been calculated from other variables.
+  !> Stores real numbers, calculated from other variables, as the values of a variable.
   pure subroutine put_reals(self, name, numbers)
     class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -220,8 +220,8 @@ contains
     self%values(row_of(self%name, name))%reals = numbers
   end subroutine put_reals
 
-  !> Reports a problem of a variable. The report contains the number of the line that sets the variable or, if no line sets the
-  !> variable, the number of the first line of the group.
+  !> Reports a problem of a variable, with the number of the line that sets it or, if there is none,
+  !> of the first line of the group.
   pure subroutine complain(self, name, what, problems)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -244,9 +244,9 @@ contains
     end associate
   end subroutine demand
 
-  !> Sets choices (such as `placement = 'grid'`) that the user has not given but that follow from other variables. If the user has
-  !> given a variable that has an effect only with one choice (such as the variable `grid`), the choice follows from this variable.
-  !> If several given variables determine a choice, the last variable in the table takes precedence.
+  !> Sets choices (such as `placement = 'grid'`) that are not given but follow from other variables:
+  !> a given variable that has an effect only with one choice (such as `grid`) implies this choice.
+  !> If several variables imply a choice, the last in the table takes precedence.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
     character(len=len(table%goes_with)), allocatable :: words(:)   ! name of a variable, and its values in the condition
@@ -259,10 +259,10 @@ contains
     end do
   end subroutine infer_choices
 
-  !> Checks the variables that have an effect only with certain choices. If a choice requires a variable, the variable must be
-  !> given. If a variable has no effect with the choices in the group, the value of the variable is removed. If the user has set a
-  !> variable that has no effect, an error is reported, because no part of an input may be ignored silently. The procedure also
-  !> reports variables that exclude each other.
+  !> Checks the variables that have an effect only with certain choices. A variable required by a
+  !> choice must be given. The value of a variable without effect is removed, and reported as an
+  !> error if the user has set it, because no part of an input may be ignored silently. Variables
+  !> that exclude each other are also reported.
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
@@ -293,8 +293,9 @@ contains
     end do
   end subroutine check_choices
 
-  !> Reports that a choice requires a variable that is not given. A choice can also require one of two variables that exclude each
-  !> other, for example drive.temperature or drive.velocity; the problem is then reported only once.
+  !> Reports that a choice requires a variable that is not given. If it requires one of two
+  !> variables that exclude each other, for example drive.temperature or drive.velocity, this is
+  !> reported only once.
   pure subroutine demand_one(self, k, choice, word, problems)
     class(group_t), intent(in) :: self
     integer, intent(in) :: k                           !! position of the variable in `self%values`
@@ -315,8 +316,8 @@ contains
     call self%complain(choice, "'"//word//"' needs "//needed, problems)
   end subroutine demand_one
 
-  !> Indices of the first and the last group with one of the given names. If the input contains no group with one of the given
-  !> names, the last index is smaller than the first index.
+  !> Indices of the first and the last group with one of the given names. If there is none, the last
+  !> index is smaller than the first.
   pure function range_of(groups, names) result(range)
     type(group_t), intent(in) :: groups(:)   !! groups in the order of the table
     character(len=*), intent(in) :: names(:)           !! names of groups that are adjacent in the table
@@ -343,7 +344,8 @@ contains
     text = text//trim(self%values(k)%name)//" = "//self%values(k)%json(longest)
   end function value_line
 
-  !> Converts the value of a variable, or a list of values, to JSON. A list with more than `most` values is truncated.
+  !> Converts the value of a variable, or a list of values, to JSON, truncating a list to `most`
+  !> values.
   pure function json(self, most) result(text)
     class(value_t), intent(in) :: self
     integer, intent(in), optional :: most

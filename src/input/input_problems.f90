@@ -10,12 +10,12 @@ module input_problems
   integer, parameter :: whole_file = 1000000000 !! rank of a problem of the whole file, larger than any line number
 
   type :: problem_t
-    integer :: line  !! line number in the input file, 0 for the whole file, or the negative integer -k for override number k
+    integer :: line  !! line number in the input file; 0 for the whole file; the negative integer -k for override number k
     character(len=:), allocatable :: text
   end type problem_t
 
-  !> The list of problems in the order of the report: first problems of single lines of the file, in the order of the lines, then
-  !> problems of the whole file, and then problems of overrides.
+  !> The list of problems in the order of the report: those of single lines of the file, in the
+  !> order of the lines; those of the whole file; those of overrides.
   type :: problem_list_t
     integer :: count = 0
     integer :: unreadable = 0                   !! number of problems that concern an unreadable file
@@ -54,7 +54,7 @@ contains
     self%count = self%count + 1
   end subroutine add
 
-  !> Rank of a line number: the report contains the problems in the order of the ranks of their lines.
+  !> Rank of a line number, which determines the order of the report.
   pure function rank(line)
     integer, intent(in) :: line
     integer :: rank
@@ -62,8 +62,8 @@ contains
     rank = merge(line, whole_file - line, line > 0)
   end function rank
 
-  !> Converts all problems to one error. The message contains one line for each problem, in the form path:line: group.variable:
-  !> problem, allowed values.
+  !> Converts all problems to one error, with one line per problem in the form path:line:
+  !> group.variable: problem, allowed values.
   subroutine report(self, path, error, overrides)
     class(problem_list_t), intent(in) :: self
     character(len=*), intent(in) :: path
@@ -83,7 +83,7 @@ contains
       end associate
     end do
     if (self%cut_short) text = text//new_line("a")//legible(path)//": there are more problems than these "//written(most_problems)
-    allocate (error)                            ! `fail` is not used, because it accepts only a single line
+    allocate (error)                            ! `fail` accepts only a single line
     error%message = text(2:)
     error%code = merge(exit_files, exit_usage, self%unreadable == self%count)
   end subroutine report

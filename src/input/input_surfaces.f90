@@ -2,18 +2,20 @@
 module input_surfaces
   use arcs, only: new_arc
   use box_geometry, only: box_t
+  use box_side, only: side_t
   use circles, only: new_circle
   use collisions, only: tangential_law_t, normal_rule, speed_law_t, wall_law_t, wall_rules
   use errors, only: error_t, exit_files
   use input_problems, only: problem_list_t
   use input_species, only: check_name
   use kinds, only: int64, real64
+  use group_fields, only: group_fields_t
   use input_groups, only: group_t
-  use variables, only: either, largest, table, words_of
+  use motions, only: choose_motion
+  use variables, only: either, table, words_of
   use obstacle_file, only: read_obstacles
   use partners, only: n_sides, side_name
   use segments, only: new_segment
-  use side_motion, only: piston, motions, sawtooth, side_motion_t, still, constant_velocity
   use texts, only: counted, place_of, written
   implicit none
   private
@@ -157,7 +159,8 @@ contains
     end associate
   end subroutine take_points
 
-  !> Reports an arc with only one angle, and an arc that does not extend counter-clockwise by at most one turn.
+  !> Reports an arc with only one angle, or one that does not extend counter-clockwise by at most
+  !> one turn.
   subroutine check_angles(group, problems, complete)
     type(group_t), intent(in) :: group
     type(problem_list_t), intent(inout) :: problems
@@ -180,8 +183,8 @@ contains
     complete = .false.
   end subroutine check_angles
 
-  !> Sets the contact laws of all sides and obstacles, and the motions of all sides. Values that a group does not contain are taken
-  !> from `&contact`.
+  !> Sets the contact laws of all sides and obstacles, and the motions of all sides. Values not
+  !> given in a group are taken from `&contact`.
   subroutine take_wall_laws(sides, obstacles, otherwise, box, problems)
     type(group_t), intent(inout) :: sides(:)
     type(group_t), intent(inout) :: obstacles(:)
@@ -210,12 +213,14 @@ contains
         call take_law(sides(k), box%surface(side)%law)
         axis = (side + 1)/2
         width = box%upper(axis) - box%lower(axis)
-        call take_motion(sides(k), box%surface(side)%motion)
-        if (.not. box%surface(side)%motion%moves()) cycle
-        ! Opposite sides must not touch each other, whatever the phases of their motions are.
-        if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%innermost_position()) >= width) call sides(k)%complain( &
-          culprit(box%surface(side)%motion), "lets the sides meet, which are "// &
-          written(width)//" apart (box.upper)", problems)
+        call take_motion(sides(k), box%side(side))
+        box%open(side) = sides(k)%text_of("open") == ".true."
+        if (box%open(side) .and. box%side(side)%moves()) call sides(k)%complain("open", "cannot be combined with " &
+          //"side.motion = '"//sides(k)%text_of("motion")//"' of the same side", problems)
+        if (.not. box%side(side)%moves()) cycle
+        ! Opposite sides must not touch each other, whatever the phases of their motions.
+        if (width > 0 .and. sum(box%side(2*axis - 1:2*axis)%innermost_position()) >= width) call sides(k)%complain( &
+          box%side(side)%motion%culprit(), "lets the sides meet, which are "//written(width)//" apart (box.upper)", problems)
       end if
     end do
     do k = n_sides + 1, size(box%surface)
@@ -224,8 +229,8 @@ contains
 
   contains
 
-    !> Sets the contact law of one side or obstacle. Values that are taken from `&contact` are also stored in the group of the side
-    !> or obstacle.
+    !> Sets the contact law of one side or obstacle. Values taken from `&contact` are also stored in
+    !> its group.
     subroutine take_law(group, law)
       type(group_t), intent(inout) :: group
       type(wall_law_t), intent(out) :: law
@@ -250,54 +255,31 @@ contains
         "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
     end subroutine take_law
 
-    !> Name of the variable that determines how far inwards a side moves.
-    pure function culprit(motion) result(name)
-      type(side_motion_t), intent(in) :: motion
-      character(len=:), allocatable :: name
-
-      name = "amplitude"
-      if (motion%moves_permanently()) name = "position"
-      if (motion%kind == constant_velocity .and. motion%prescribed_velocity > 0) name = "end_time"
-    end function culprit
-
     !> Sets the motion of a side.
-    subroutine take_motion(group, motion)
+    subroutine take_motion(group, place)
       type(group_t), intent(in) :: group
-      type(side_motion_t), intent(out) :: motion
+      type(side_t), intent(out) :: place
+      type(group_fields_t) :: fields
+      real(real64) :: offset                              ! displacement inwards at the start of the motion [length]
 
       if (group%faulty("motion")) return
-      motion%kind = place_of(group%text_of("motion"), words_of(motions))
-      motion%amplitude = group%real_of("amplitude", 0.0_real64)
-      motion%period = group%real_of("period", 1.0_real64)
-      motion%phase = group%real_of("phase", 0.0_real64)
-      motion%prescribed_velocity = group%real_of("velocity", 0.0_real64)
-      if (group%given("position") .and. .not. group%faulty("position")) motion%offset = merge( &
+      call choose_motion(group%text_of("motion"), place%motion)
+      fields = group_fields_t(group, problems)
+      if (allocated(place%motion)) call place%motion%read(fields, width)
+      offset = 0
+      if (group%given("position") .and. .not. group%faulty("position")) offset = merge( &
         group%real_of("position", 0.0_real64) - box%lower(axis), box%upper(axis) - group%real_of("position", 0.0_real64), &
         modulo(side, 2) == 1)
-      if (motion%kind == still .and. abs(motion%offset) > 0) motion%kind = constant_velocity    ! with velocity 0
-      if (motion%kind == sawtooth .and. group%given("velocity") .and. .not. motion%prescribed_velocity > 0) call group%complain( &
-        "velocity", "must be > 0 with motion = 'sawtooth': the side strikes inwards", problems)
-      if (motion%kind == constant_velocity) then
-        motion%start_time = group%real_of("start_time", 0.0_real64)
-        motion%end_time = group%real_of("end_time", 0.0_real64)
-        motion%amplitude = abs(motion%offset) + abs(motion%prescribed_velocity)*(motion%end_time - motion%start_time)
-        if (group%given("end_time") .and. motion%end_time <= motion%start_time) call group%complain( &
-          "end_time", "is not after start_time, "//written(motion%start_time), problems)
-        if (motion%amplitude > largest) call group%complain("end_time", "the side moves as far as "//written(motion%amplitude) &
-          //"; allowed: up to "//written(largest), problems)
-      else if (motion%kind == piston) then
-        motion%mass = group%real_of("mass", 1.0_real64)
-        motion%pull = group%real_of("force", 0.0_real64)/motion%mass
-        motion%amplitude = width
-        box%side(side)%position = motion%offset
-      else if (motion%highest_speed() > largest) then
-        call group%complain("period", "the side moves at up to "// &
-          written(motion%highest_speed())//"; allowed: up to "//written(largest), problems)
-      end if
+      call place%place(offset)
+      if (.not. allocated(place%motion)) return
+      if (place%motion%is_piston()) place%state%position = offset
+      call place%motion%check(fields)
+      problems = fields%problems
     end subroutine take_motion
+
   end subroutine take_wall_laws
 
-  !> Reports coefficients of restitution in the input that are smaller than the viscoelastic law allows.
+  !> Reports coefficients of restitution smaller than the viscoelastic law allows.
   subroutine check_least(group, name, by_speed, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name

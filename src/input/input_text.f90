@@ -1,32 +1,31 @@
-!> Reads the text of an input file and splits the text into lines and tokens. The namelist reader of Fortran is not used: it accepts
-!> some invalid texts without a message, its messages contain neither the line nor the variable, and it can crash. The modules
-!> `input_text` and `namelist_input` read the text instead, with a small and strict grammar. A group has the form
-!> `&group name = value, value name(2) = value name = 3*value /`, and a comment begins with `!`. A text that does not obey the
-!> grammar is reported as an error with its line number.
+!> Reads the text of an input file and splits it into lines and tokens. The namelist reader of
+!> Fortran accepts some invalid texts without a message, names neither the line nor the variable in
+!> its messages, and can crash. This module and `namelist_input` therefore use a small and strict
+!> grammar of their own. A group has the form `&group name = value, value name(2) = value name =
+!> 3*value /`, and a comment begins with `!`. Any other text is reported as an error with its line
+!> number.
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
   use system, only: file_size, is_folder, read_file
-  use texts, only: digits, eol, letters, shown, written
+  use texts, only: byte_order_mark, digits, eol, letters, shown, written
   implicit none
   private
-  public :: read_text, unix_lines, byte_order_mark, find_words
+  public :: read_text, unix_lines
   public :: assignment_t, content, cut, plain, token_t, word, unclosed, ending
 
   integer(int64), parameter :: largest_file = 4194304   !! bytes
-  integer, parameter, public :: longest_line = 1024     !! longest line in a file of disks or obstacles
   integer, private :: i
   character(len=1), parameter :: control(*) = [(achar(i), i=0, 8), achar(11), achar(12), (achar(i), i=14, 31), achar(127)]
-  character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
-  !> Kinds of tokens. The kind of a single character such as & or = is the character itself, and the kind of a quoted text is its
-  !> quotation mark.
+  !> Kinds of tokens. A single character such as & or = is its own kind, and the kind of a quoted
+  !> string is its quotation mark.
   character(len=1), parameter :: word = "w", unclosed = "u", junk = "?", ending = "e"
   character(len=*), parameter :: blanks = " "//achar(9), quotes = "'""", marks = "&/=,()"
   character(len=*), parameter :: word_characters = digits//".+-"//letters//"_*%#:$@?<>|[]{}~^`\"
 
-  !> A token. `first` and `last` are the positions in the text of the first and the last character of the token, including quotation
-  !> marks.
+  !> A token. `first` and `last` are the positions of its first and last character in the text,
+  !> including quotation marks.
   type :: token_t
     character(len=1) :: kind
     integer :: first, last, line
@@ -42,27 +41,6 @@ module input_text
   end type assignment_t
 
 contains
-
-  !> Finds the words in a line of a table. The text from a # to the end of the line is a comment.
-  pure subroutine find_words(line, first, last, n)
-    character(len=*), intent(in) :: line
-    integer, intent(out) :: first(:), last(:)
-    integer, intent(out) :: n                           !! number of words
-    character(len=*), parameter :: separators = " ,"//achar(9)//achar(13)
-    integer :: begin, past, comment
-
-    comment = index(line//"#", "#")
-    n = 0
-    past = 1
-    do
-      begin = past - 1 + verify(line(past:comment - 1)//"x", separators)
-      if (begin >= comment) exit
-      past = begin - 1 + scan(line(begin:comment - 1)//" ", separators)
-      n = n + 1
-      first(n) = begin
-      last(n) = past - 1
-    end do
-  end subroutine find_words
 
   !> Reads the bytes of a regular file.
   subroutine read_text(path, text, error)
@@ -111,7 +89,8 @@ contains
     if (advice /= "") advice = "; did you mean "//advice//"?"
   end function advice
 
-  !> Converts a text to a normal form in which every line ends in a line feed and no byte order mark is present.
+  !> Converts a text to a normal form, in which every line ends in a line feed and there is no byte
+  !> order mark.
   pure function unix_lines(text) result(lines)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: lines
@@ -133,8 +112,8 @@ contains
     lines = lines(:n)//eol
   end function unix_lines
 
-  !> Splits a text into tokens. Several tokens of kind `ending` are added after the last token of the text, so that a parser can
-  !> look ahead beyond the last token.
+  !> Splits a text into tokens. Several tokens of kind `ending` follow the last one, so that a
+  !> parser can look ahead beyond it.
   pure subroutine cut(text, tokens)
     character(len=*), intent(in) :: text         !! every line ends in a line feed
     type(token_t), allocatable, intent(out) :: tokens(:)
@@ -173,8 +152,8 @@ contains
 
   contains
 
-    !> Finds the end of a quoted text, which must be in the line in which the text begins. Two quotation marks in succession
-    !> represent one quotation mark.
+    !> Finds the end of a quoted string, which must be in the line in which it begins. Two quotation
+    !> marks in succession represent one.
     pure subroutine end_quote(token)
       type(token_t), intent(inout) :: token
 
@@ -191,7 +170,7 @@ contains
     end subroutine end_quote
   end subroutine cut
 
-  !> Value of a token. In a quoted text, two quotation marks in succession are replaced by one.
+  !> Value of a token. In a quoted string, two quotation marks in succession are replaced by one.
   pure function content(text, token) result(value)
     character(len=*), intent(in) :: text
     type(token_t), intent(in) :: token
@@ -210,7 +189,7 @@ contains
     value = value(:n)
   end function content
 
-  !> Converts a name to the form that is used in messages: a long name is truncated and quoted.
+  !> Converts a name to the form used in messages: a long name is truncated and quoted.
   pure function plain(name)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: plain

@@ -17,15 +17,14 @@ module input_words
 
 contains
 
-  !> Stores the values of an assignment in `slot`. If a value is invalid, the problem is reported, `slot` is marked as faulty, and
-  !> the previous value in `slot` does not change.
+  !> Stores the values of an assignment in `slot`. If a value is invalid, the problem is reported
+  !> and `slot` is marked as faulty, without changing its previous value.
   subroutine store_values(slot, text, assignment, problems)
     type(value_t), intent(inout) :: slot
     character(len=*), intent(in) :: text                 !! text to which the tokens refer
     type(assignment_t), intent(in) :: assignment
     type(problem_list_t), intent(inout) :: problems
     type(value_t) :: new
-    type(variable_t) :: row
     character(len=:), allocatable :: problem
     integer(int64) :: total
     integer :: k, n
@@ -34,10 +33,9 @@ contains
     slot%given = .true.
     slot%faulty = .true.
     if (.not. assignment%sound) return
-    row = table(slot%row)
     associate (tokens => assignment%tokens)
       total = sum(int(tokens%repeats, int64))
-      call check_number()
+      problem = number_problem(slot, text, assignment, total)
       if (problem /= "") then
         call problems%add(assignment%line, assignment%where, problem)
         return
@@ -51,7 +49,7 @@ contains
         if (slot%kind /= "real") allocate (new%texts(total))
       end if
       do k = 1, size(tokens)
-        call store_token(tokens(k), content(text, tokens(k)))
+        call store_token(new, n, tokens(k), content(text, tokens(k)), assignment%line <= 0, problem)
         n = n + tokens(k)%repeats
         if (problem == "") cycle
         call problems%add(merge(tokens(k)%line, assignment%line, assignment%line > 0), assignment%where, problem)
@@ -60,12 +58,18 @@ contains
       end do
     end associate
     if (.not. new%faulty) slot = new
+  end subroutine store_values
 
-  contains
+  !> The problem of the number of values in an assignment; empty if there is none.
+  function number_problem(slot, text, assignment, total) result(problem)
+    type(value_t), intent(in) :: slot
+    character(len=*), intent(in) :: text
+    type(assignment_t), intent(in) :: assignment
+    integer(int64), intent(in) :: total                  !! number of values
+    character(len=:), allocatable :: problem
 
-    !> Checks the number of values in the assignment.
-    subroutine check_number()
-      problem = ""
+    problem = ""
+    associate (row => table(slot%row))
       if (assignment%element > 0) then
         if (.not. slot%is_set()) then
           problem = "has no value yet, so that no element can be set; give all: "//trim(row%name)//" = "//trim(row%value)
@@ -76,41 +80,48 @@ contains
         end if
       else if (row%size > 0 .and. total /= row%size) then
         problem = counted(total, "value")//" instead of "//written(row%size)//"; allowed: "//allowed(row)
-        if (row%kind == "real" .and. size(assignment%tokens) == 2*row%size) problem = problem//decimal_hint()
+        if (slot%kind == "real" .and. size(assignment%tokens) == 2*row%size) &
+          problem = problem//decimal_hint(text, assignment%tokens)
       else if (total > most_values) then
         problem = counted(total, "value")//"; allowed: up to "//written(most_values)
       end if
-    end subroutine check_number
+    end associate
+  end function number_problem
 
-    !> A hint for users who have written a real number with a decimal comma, as in `0,9`.
-    function decimal_hint() result(hint)
-      character(len=:), allocatable :: hint
+  !> Hint for users who have written a real number with a decimal comma, as in `0,9`.
+  function decimal_hint(text, tokens) result(hint)
+    character(len=*), intent(in) :: text
+    type(token_t), intent(in) :: tokens(:)
+    character(len=:), allocatable :: hint
+    integer :: k
 
-      hint = ""
-      associate (tokens => assignment%tokens)
-        do k = 1, size(tokens), 2
-          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! the two numbers are not separated by a comma alone
-          if (verify(content(text, tokens(k + 1)), digits) > 0) return
-        end do
-        hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))// &
-          "? the decimal sign is a point"
-      end associate
-    end function decimal_hint
+    hint = ""
+    do k = 1, size(tokens), 2
+      if (tokens(k + 1)%first /= tokens(k)%last + 2) return         ! the two numbers are not separated by a comma alone
+      if (verify(content(text, tokens(k + 1)), digits) > 0) return
+    end do
+    hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))//"? the decimal sign is a point"
+  end function decimal_hint
 
-    !> Checks one word, and stores its value after the n values that have already been stored.
-    subroutine store_token(token, word)
-      type(token_t), intent(in) :: token
-      character(len=*), intent(in) :: word
-      character(len=:), allocatable :: normal        ! the value in a standard form, such as `.true.` for `T`
-      integer(int64) :: whole
-      real(real64) :: number
-      logical :: quoted
+  !> Checks one word, and stores its value after the n values already stored.
+  subroutine store_token(slot, n, token, word, is_bare, problem)
+    type(value_t), intent(inout) :: slot
+    integer, intent(in) :: n
+    type(token_t), intent(in) :: token
+    character(len=*), intent(in) :: word
+    logical, intent(in) :: is_bare                       !! whether strings need no quotation marks, as in overrides
+    character(len=:), allocatable, intent(out) :: problem
+    character(len=:), allocatable :: normal              ! the value in a standard form, such as `.true.` for `T`
+    integer(int64) :: whole
+    real(real64) :: number
+    logical :: quoted
 
-      quoted = scan(token%kind, "'""") > 0
-      normal = word
-      number = 0
-      problem = ""
-      select case (row%kind)
+    quoted = scan(token%kind, "'""") > 0
+    normal = word
+    number = 0
+    problem = ""
+    associate (row => table(slot%row))
+      select case (slot%kind)
       case ("integer")
         call read_integer(word, whole, problem)
         normal = written(whole)
@@ -122,41 +133,44 @@ contains
         if (any(lower_case(word) == yes)) normal = ".true."
         if (all(lower_case(word) /= [yes, no])) problem = "is neither true nor false"
       case default
-        call check_text(word, assignment%line <= 0 .or. quoted)
+        problem = text_problem(row, word, is_bare .or. quoted)
       end select
-      if (row%kind /= "text") then
+      if (slot%kind /= "text") then
         if (problem == "" .and. (number < row%range%lower .or. number > row%range%upper)) problem = "is out of range"
         if (quoted) problem = "is in quotes"
         if (problem /= "") problem = shown(word)//" "//problem//"; allowed: "//allowed(row)
       end if
       if (problem /= "") return
-      if (row%kind == "real") then
-        new%reals(n + 1:n + token%repeats) = number
+      if (slot%kind == "real") then
+        slot%reals(n + 1:n + token%repeats) = number
       else
-        new%texts(n + 1:n + token%repeats) = normal
+        slot%texts(n + 1:n + token%repeats) = normal
       end if
-    end subroutine store_token
+    end associate
+  end subroutine store_token
 
-    !> Checks a text. The text must be in quotation marks (except in overrides) and must not be too long. If the variable has
-    !> choices, the text must be one of the choices.
-    subroutine check_text(word, quoted)
-      character(len=*), intent(in) :: word
-      logical, intent(in) :: quoted
-      character(len=:), allocatable :: meant
+  !> The problem of a string, which must be quoted (except in overrides), not too long, and one of
+  !> the choices of the variable, if it has any; empty if there is none.
+  function text_problem(row, word, quoted) result(problem)
+    type(variable_t), intent(in) :: row
+    character(len=*), intent(in) :: word
+    logical, intent(in) :: quoted
+    character(len=:), allocatable :: problem
+    character(len=:), allocatable :: meant
 
-      if (.not. quoted) then
-        problem = shown(word)//" is not in quotes; allowed: "//allowed(row)
-      else if (len(word) > text_length) then
-        problem = "the text has "//written(len(word))//" bytes; allowed: up to "//written(text_length)
-      else if (row%choices /= "" .and. all(words_of(row%choices) /= word)) then
-        meant = nearest_word(word, words_of(row%choices))
-        if (meant /= "") meant = "did you mean """//meant//"""? "
-        problem = shown(word)//" is not allowed; "//meant//"allowed: "//allowed(row)
-        meant = new_name(row%group, row%name, word)
-        if (meant /= "") problem = "'"//word//"' is called '"//meant//"' now"
-      end if
-    end subroutine check_text
-  end subroutine store_values
+    problem = ""
+    if (.not. quoted) then
+      problem = shown(word)//" is not in quotes; allowed: "//allowed(row)
+    else if (len(word) > text_length) then
+      problem = "the text has "//written(len(word))//" bytes; allowed: up to "//written(text_length)
+    else if (row%choices /= "" .and. all(words_of(row%choices) /= word)) then
+      meant = nearest_word(word, words_of(row%choices))
+      if (meant /= "") meant = "did you mean """//meant//"""? "
+      problem = shown(word)//" is not allowed; "//meant//"allowed: "//allowed(row)
+      meant = new_name(row%group, row%name, word)
+      if (meant /= "") problem = "'"//word//"' is called '"//meant//"' now"
+    end if
+  end function text_problem
 
   !> Whether a word consists of digits with an optional sign.
   pure function is_whole(word)
@@ -186,8 +200,9 @@ contains
     if (status == 0) problem = ""
   end subroutine read_integer
 
-  !> Reads a decimal number with an optional exponent e or d, as in Fortran. The number must be 0, or its absolute value must be
-  !> between 1e-100 and 1e100, so that neither overflow nor denormal numbers can occur.
+  !> Reads a decimal number with an optional exponent e or d, as in Fortran. It must be 0 or have an
+  !> absolute value between 1e-100 and 1e100, so that neither overflow nor denormal numbers can
+  !> occur.
   pure subroutine read_real(word, value, problem)
     character(len=*), intent(in) :: word
     real(real64), intent(out) :: value
@@ -212,7 +227,7 @@ contains
     end if
     problem = ""
     if (scan(word(:mark - 1), "123456789") == 0) return
-    if (abs(exponent) <= 200) then                 ! with such exponents, the reading neither overflows nor underflows
+    if (abs(exponent) <= 200) then                 ! with such exponents, reading neither overflows nor underflows
       read (word, "(f60.0)", iostat=status) value
       if (status == 0 .and. abs(value) >= smallest .and. abs(value) <= largest) return
     end if

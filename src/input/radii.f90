@@ -1,6 +1,7 @@
-!> The radii of the disks of a species, which are equal or drawn from a distribution. The distribution is truncated such that the
-!> largest possible radius is ten times the smallest possible radius. If a drawn radius is outside the limits of the distribution, a
-!> new radius is drawn. Polydispersities for which many radii would be outside the limits are not allowed.
+!> The radii of the disks of a species, which are equal or drawn from a distribution. The
+!> distribution is truncated such that the largest possible radius is ten times the smallest; a
+!> radius outside these limits is drawn again. Polydispersities for which this would happen often
+!> are not allowed.
 module radii
   use kinds, only: int64, real64
   use random_stream, only: random_stream_t
@@ -17,8 +18,9 @@ module radii
 
 contains
 
-  !> Draws the radius of each disk. In a lognormal distribution, the logarithm of the radius has the variance
-  !> ln(1+polydispersity**2). The last bits of lognormal and Gaussian radii may depend on the mathematical library.
+  !> Draws the radius of each disk. The logarithm of a lognormal radius has the variance
+  !> ln(1+polydispersity**2). The last bits of lognormal and Gaussian radii may depend on the
+  !> mathematical library.
   pure function drawn_radii(species, s, seed) result(radius)
     class(species_settings_t), intent(in) :: species
     integer, intent(in) :: s                                !! index of the species

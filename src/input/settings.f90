@@ -1,21 +1,20 @@
-!> The settings of a run as typed data, which combine the input file, the overrides and the defaults. The module `variables`
-!> contains the meaning, the range and the unit of each variable.
+!> The settings of a run as typed data, from the input file, the overrides and the defaults. The
+!> meaning, range and unit of each variable are described in `variables`.
 module settings
   use kinds, only: int64, never, real64
   use disks, only: species_t
-  use drive, only: active
   use errors, only: error_t
   use input_groups, only: group_t, text_length
-  use side_motion, only: piston
-  use simulation_state, only: system_t
+  use placement, only: placement_t
+  use simulation_state, only: change_t, system_t
   use stop_rules, only: stop_settings_t
-  use texts, only: text_t
+  use texts, only: text_t, written
   implicit none
   private
   public :: run_input_t, settings_t, run_settings_t, sampling_t, species_settings_t, output_settings_t, disks_in_file_t
 
-  !> Smallest number of disks for which a division into domains saves time even on one core, because the data of one domain fit into
-  !> the cache.
+  !> Smallest number of disks for which domains save time even on one core, because the data of one
+  !> domain fit into the cache.
   integer, parameter :: many_disks = 500000
 
   type :: run_settings_t
@@ -25,7 +24,7 @@ module settings
     real(real64) :: dt                                !! time step if `dynamics` is 'steps' [time]
     character(len=:), allocatable :: search           !! method of the neighbour search: 'cells', 'pairs' or 'rescan'
     character(len=:), allocatable :: queue            !! kind of the event queue: 'calendar' or 'heap'
-    !> Number of threads. The value 0 means that the number of threads is taken from the environment when the threads are started.
+    !> Number of threads; 0 to take it from the environment when the threads are started.
     integer :: threads
     integer :: threads_asked = 1                      !! number of threads that the user requested
   end type run_settings_t
@@ -46,24 +45,21 @@ module settings
     !> Standard deviation of the radii divided by their mean; 0 if all radii are equal.
     real(real64) :: polydispersity = 0.0_real64
     character(len=:), allocatable :: distribution     !! distribution of the radii: 'uniform', 'gaussian', 'lognormal'
-    !> Whether the masses of the disks are proportional to the areas of the disks. If the masses are proportional to the areas,
-    !> `mass` is the mass of a disk with the mean radius.
+    !> Whether masses are proportional to the areas of the disks; `mass` is then that of a disk with
+    !> the mean radius.
     logical :: mass_by_area = .false.
     logical :: mass_in_file = .false.                 !! .true. to read masses from the file, if the file contains masses
     logical :: radius_in_file = .false.               !! .true. if radii are read from the file
     logical :: spin_in_file = .false.                 !! .true. if angular velocities are read from the file
     logical :: angle_in_file = .false.                !! .true. if the file contains orientations
+    integer :: waiting = 0                            !! number of disks that wait outside of the box at the start
     logical :: is_base = .false.                      !! .true. if masses and radii of other species are relative to this species
     real(real64) :: region(4)                         !! xlo, xhi, ylo, yhi [length]
-    !> Method of the initial positions: 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown', 'relaxed'
-    character(len=:), allocatable :: placement
-    integer(int64) :: relaxation_sweeps = 0           !! number of sweeps of event-chain Monte Carlo for 'relaxed'
-    integer :: grid(2)                                !! numbers of columns and rows; 0, 0 if they are not given
-    character(len=:), allocatable :: file             !! for placement 'file' or 'grown': text file, or HDF5 file of a run
+    class(placement_t), allocatable :: placement      !! method of the initial positions
+    character(len=:), allocatable :: file             !! text file, or HDF5 file of a run; empty if there is none
     !> .true. to scale positions from the output of another run to the box of this run
     logical :: scale_positions = .false.
     type(disks_in_file_t) :: in_file
-    real(real64), allocatable :: position(:, :)       !! (2,count) given positions for 'explicit' [length]; otherwise shape (2,0)
     !> Method of the initial velocities: 'rest', 'equal_speed', 'uniform', 'maxwell', 'explicit', 'file'
     character(len=:), allocatable :: velocities
     !> Speed for 'equal_speed', and largest velocity component for 'uniform' [length/time]
@@ -73,8 +69,10 @@ module settings
     !> Given velocities for 'explicit': shape (2,count), or (2,1) if all disks have the same velocity; otherwise shape (2,0)
     real(real64), allocatable :: velocity(:, :)
     real(real64) :: angular_velocity = 0.0_real64     !! angular velocity of all disks [1/time]
-    !> kT of the rotation, which is the mean of I omega**2; negative if the input does not contain this temperature [energy]
+    !> kT of the rotation, the mean of I omega**2; negative if it is not given [energy]
     real(real64) :: rotational_temperature = -1.0_real64
+  contains
+    procedure :: count_text
   end type species_settings_t
 
   !> Quantities that determine when samples are taken, as in the names of variables such as output.frames_every_time.
@@ -109,10 +107,12 @@ module settings
     type(species_settings_t), allocatable :: species(:)
     type(stop_settings_t) :: stop
     type(output_settings_t) :: output
+    logical :: has_lids = .false.                     !! whether a side has the variable `open`, so that it can be opened or closed
+    type(change_t), allocatable :: schedule(:)        !! changes during the run, in the order of their times
   contains
     procedure :: n_disks
-    procedure :: n_driven
     procedure :: choose_features
+    procedure :: is_open
     procedure :: wants_domains
   end type settings_t
 
@@ -130,6 +130,15 @@ module settings
 
 contains
 
+  !> Part of a message: the number of disks of the species, and whether some of them wait.
+  pure function count_text(self) result(text)
+    class(species_settings_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = written(self%count)
+    if (self%waiting > 0) text = text//", of which some wait"
+  end function count_text
+
   !> Total number of disks.
   pure function n_disks(self) result(n)
     class(settings_t), intent(in) :: self
@@ -138,17 +147,8 @@ contains
     n = sum(int(self%species%count, int64))
   end function n_disks
 
-  !> Number of driven disks.
-  pure function n_driven(self) result(n)
-    class(settings_t), intent(in) :: self
-    integer(int64) :: n
-    integer :: k
-
-    n = sum(int(self%species%count, int64), mask=self%drive%acts_on([(k, k=1, size(self%species))]))
-  end function n_driven
-
-  !> Determines the features that the run needs, such as rotation. The procedure `choose_features` must be called after the starting
-  !> files have been read.
+  !> Determines the features that the run needs, such as rotation. This must follow the reading of
+  !> initial-configuration files.
   pure subroutine choose_features(self)
     class(settings_t), intent(inout) :: self
 
@@ -156,21 +156,36 @@ contains
       features%own_sizes = any(species%mass_in_file .or. species%radius_in_file .or. species%polydispersity > 0)
       features%rotation = self%law%tangential%is_rough() .or. self%box%has_rough_walls() &
         .or. any(abs(species%angular_velocity) > 0 .or. species%rotational_temperature >= 0 .or. species%spin_in_file)
-      features%orientation = features%rotation .or. self%drive%kind == active .or. any(species%angle_in_file)
+      features%orientation = features%rotation .or. any(species%angle_in_file)
+      if (allocated(self%drive)) features%orientation = features%orientation .or. self%drive%orients_disks()
       features%helfand = self%output%helfand
-      features%stress = features%rotation .or. self%box%gives_energy() .or. self%drive%is_on() .or. self%output%virial_tensor &
+      features%collapses = self%law%can_collapse()
+      features%moving = self%box%side%moves()
+      features%open = self%is_open()
+      features%stress = features%rotation .or. self%box%gives_energy() .or. allocated(self%drive) .or. self%output%virial_tensor &
         .or. features%helfand
     end associate
   end subroutine choose_features
 
-  !> Whether the run should use domains, which is the case with several threads, or with many disks on one core.
-  pure function wants_domains(self) result(yes)
+  !> Whether disks can leave or enter the box.
+  pure function is_open(self) result(yes)
     class(settings_t), intent(in) :: self
     logical :: yes
 
+    yes = self%has_lids .or. allocated(self%source) .or. any(self%species%waiting > 0)
+  end function is_open
+
+  !> Whether the run should use domains: with several threads, or with many disks on one core.
+  pure function wants_domains(self) result(yes)
+    class(settings_t), intent(in) :: self
+    logical :: yes
+    integer :: k
+
     yes = self%run%dynamics == "events" .and. self%run%search == "cells" &
-      .and. .not. (self%box%is_sheared() .or. any(self%box%surface%motion%kind == piston)) &
+      .and. .not. (self%box%is_sheared() .or. self%features%open .or. any(self%box%side%is_piston())) &
       .and. (self%run%threads > 1 .or. self%n_disks() >= many_disks)
+    if (.not. (yes .and. allocated(self%schedule))) return
+    yes = .not. any([(self%schedule(k)%system%box%side%is_piston(), k=1, size(self%schedule))])
   end function wants_domains
 
 end module settings

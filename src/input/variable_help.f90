@@ -1,5 +1,5 @@
-!> Texts about the input variables: the reference input file, the answers to `--explain`, and JSON for other programs. JSON is
-!> written in two forms: the table of variables, and an input with the values that the program has read.
+!> Texts about the input variables: the reference input file, the answers to `--explain`, and JSON
+!> for other programs (the table of variables, and an input with the values as read).
 module variable_help
   use choices, only: meaning_of
   use errors, only: error_t, exit_usage, fail
@@ -10,14 +10,14 @@ module variable_help
   use texts, only: eol, growing_text_t, joined, lower_case, shown, suggestion, wrapped, written, written_exactly
   implicit none
   private
-  public :: defaults_text, explain, groups_text, input_of, variables_text
+  public :: defaults_text, explain, groups_text, input_of, quoted, variables_text
 
   integer, parameter :: comment_column = 40                !! column of the comments in the reference file
   integer, parameter :: help_width = 100                   !! width of a line of help
 
 contains
 
-  !> The reference input file, which contains every variable with its default. The reference file is a valid input.
+  !> The reference input file, a valid input that contains every variable with its default.
   pure function defaults_text() result(text)
     character(len=:), allocatable :: text
     integer :: g, k
@@ -25,7 +25,7 @@ contains
     text = "! Every variable of Ricochet with its default; a file needs only what differs."//eol// &
       "! A variable that is commented out or called an example has no default, or not in all cases."//eol// &
       "! ricochet --explain VARIABLE says more about each."//eol// &
-      "! Groups may be in any order; &side, &obstacle, &wall and &species may be repeated."//eol
+      "! Groups may be in any order; &side, &obstacle, &wall, &species, &source and &change may be repeated."//eol
     do g = 1, size(group_names)
       text = text//eol//margin(group_names(g))//"&"//trim(group_names(g))//eol
       do k = 1, size(table)
@@ -35,17 +35,18 @@ contains
     end do
   end function defaults_text
 
-  !> Characters at the beginning of each line of a group in the reference file. Groups that describe boundaries are commented out in
-  !> the reference file.
+  !> Beginning of each line of a group in the reference file, where groups that describe boundaries
+  !> or changes are commented out.
   pure function margin(group)
     character(len=*), intent(in) :: group
     character(len=:), allocatable :: margin
 
     margin = ""
-    if (any(wall_groups == group)) margin = "! "
+    if (any(wall_groups == group) .or. group == "source" .or. group == "change") margin = "! "
   end function margin
 
-  !> Lines for a variable in the reference file, with the first sentence of its help text and, for a text variable, its choices.
+  !> Lines for a variable in the reference file, with the first sentence of its help text and, if it
+  !> has keywords, its choices.
   pure function reference_line(row) result(line)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: line
@@ -53,7 +54,7 @@ contains
 
     indent = "  "
     if (row%status /= "default" .and. row%status /= "example") indent = "  ! "
-    if (any(wall_groups == row%group)) indent = "!   "
+    if (margin(row%group) /= "") indent = "!   "
     next = padded(margin(row%group))//" ! "
     meaning = first_sentence(row%help)
     if (row%status == "example") meaning = "Example. "//meaning
@@ -118,8 +119,8 @@ contains
     end do
   end function explanations
 
-  !> Name of a variable without the index of an element and without the name of a species or boundary. For example, the result for
-  !> `species.gas.velocity(2)` is `species.velocity`.
+  !> Name of a variable without the index of an element and without the name of a species or
+  !> boundary: `species.velocity` for `species.gas.velocity(2)`, for example.
   pure function bare(name)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: bare
@@ -131,8 +132,8 @@ contains
     if (last > first) bare = bare(:first)//bare(last + 1:)
   end function bare
 
-  !> Lists each variable whose name or help text contains the wanted text, and each choice whose name or meaning contains the wanted
-  !> text.
+  !> Lists each variable whose name or help text contains the wanted text, and each choice whose
+  !> name or meaning contains it.
   pure function matches(wanted) result(text)
     character(len=*), intent(in) :: wanted                 !! the text, in lower case
     character(len=:), allocatable :: text
@@ -173,7 +174,7 @@ contains
     end function spaced
   end function matches
 
-  !> The row of a variable in the table as a text with several lines, one for each property of the variable.
+  !> Row of a variable in the table, as a text with one line for each property.
   pure function explanation(k) result(text)
     integer, intent(in) :: k                               !! row number in the table of variables
     character(len=:), allocatable :: text
@@ -196,7 +197,7 @@ contains
     end associate
   end function explanation
 
-  !> Default of a variable, or a description of what the program does if the variable is not given.
+  !> Default of a variable, or a description of what happens if it is not given.
   pure function default_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -211,9 +212,9 @@ contains
     end if
   end function default_of
 
-  !> Condition under which a variable has an effect, such as a choice of another variable; empty if the variable always has an
-  !> effect. If a variable of `&species` needs a certain choice of another variable, and the
-  !> user has not set that other variable, the program makes the choice.
+  !> Condition under which a variable has an effect, such as a choice of another variable; empty if
+  !> it always has. A variable of `&species` that needs a choice which the user has not made implies
+  !> this choice.
   pure function condition_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -234,7 +235,8 @@ contains
 
     text = "fixed during a run: another value needs a new run"
     if (row%may_change == on_resume) text = "may change on --resume"
-    if (row%may_change == in_motion) text = "may change in a running simulation (Python, laboratory page); fixed on --resume"
+    if (row%may_change == in_motion) text = "may change in a running simulation (&change, Python, laboratory page); fixed on " &
+      //"--resume"
   end function change_text
 
   !> Converts the table of variables to JSON: each group is an object that contains an object for each variable.
@@ -257,8 +259,8 @@ contains
     text = text//eol//"}"
   end function variables_text
 
-  !> Converts a row of the table of variables to JSON. The bounds of a number are called `from` and `to` if they are allowed values,
-  !> and `above` and `below` if they are not allowed values.
+  !> Converts a row of the table of variables to JSON. The bounds of a number are called `from` and
+  !> `to` if they are allowed values, and `above` and `below` if they are not.
   pure function row_text(k) result(text)
     integer, intent(in) :: k                               !! row number in the table of variables
     character(len=:), allocatable :: text, value, meanings
@@ -303,10 +305,10 @@ contains
       member("changeable", .true., trim(merge("true ", "false", row%may_change == in_motion)))
   end function row_text
 
-  !> Converts the groups of an input to JSON, in the order of the file. The JSON object of a group contains only the variables that
-  !> the user has given. `from` and `to` are the positions of the first and last byte of the group in the file, and null if the file
-  !> does not contain the group. Positions start at 0, and refer to the text without a byte order mark and with line feeds as line
-  !> ends.
+  !> Converts the groups of an input to JSON, in the order of the file, with only the variables that
+  !> the user has given. `from` and `to` are the positions of the first and last byte of the group
+  !> in the file, and null if the file does not contain the group. Positions start at 0, and refer
+  !> to the text without a byte order mark and with line feeds as line ends.
   pure function groups_text(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -336,8 +338,8 @@ contains
     text = "["//growing%text()//eol//"]"
   end function groups_text
 
-  !> Converts groups to the text of an input file with the same content. The variable `relative_to` is omitted, because the masses
-  !> and radii of all species have their final values.
+  !> Converts groups to the text of an input file with the same content. `relative_to` is omitted,
+  !> because the masses and radii of all species have their final values.
   pure function input_of(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -373,22 +375,30 @@ contains
     text = growing%text()
   contains
 
-    !> The form in which an input file contains a value of kind "integer", "logical" or "text". Texts are quoted.
+    !> The form in which an input file contains a value of kind "integer", "logical" or "text".
+    !> Strings are quoted.
     pure function word(kind, value)
       character(len=*), intent(in) :: kind, value
       character(len=:), allocatable :: word
-      integer :: c
 
       word = trim(value)
-      if (kind /= "text") return
-      word = "'"
-      do c = 1, len_trim(value)
-        word = word//value(c:c)
-        if (value(c:c) == "'") word = word//"'"
-      end do
-      word = word//"'"
+      if (kind == "text") word = quoted(word)
     end function word
   end function input_of
+
+  !> A string in quotes, as an input file contains it.
+  pure function quoted(text)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: quoted
+    integer :: c
+
+    quoted = "'"
+    do c = 1, len(text)
+      quoted = quoted//text(c:c)
+      if (text(c:c) == "'") quoted = quoted//"'"
+    end do
+    quoted = quoted//"'"
+  end function quoted
 
   !> The JSON text `, "name": value`, with null if there is no value.
   pure function member(name, is_there, value) result(text)

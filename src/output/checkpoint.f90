@@ -1,28 +1,25 @@
-!> Checkpoints. A checkpoint contains the present state of a simulation and the progress of its output, and is stored in the output
-!> file. A resumed run yields bit-identical data to a run without interruption.
+!> Checkpoints: the present state of a simulation and the progress of its output, stored in the output file. A resumed run is
+!> bit-identical to an uninterrupted one.
 !>
-!> During a run the output file contains two slots, which are datasets with space for one checkpoint each. One of the two slots is
-!> valid, and a new checkpoint is written to the other slot. After the new checkpoint has been stored on the disk, a number in the
-!> file is changed, so that the slot with the new checkpoint becomes the valid slot. The file therefore contains a complete
-!> checkpoint at all times. Each checkpoint contains a checksum. The output of a finished run contains one slot. The output of a run
-!> that broke off contains no valid checkpoint.
+!> During a run the output file has two slots: datasets with space for one checkpoint each, one of which is valid. A new checkpoint,
+!> with a checksum, is written to the other slot; when it has reached the disk, a number in the file is changed to make this slot
+!> the valid one. The file therefore contains a complete checkpoint at all times. The output of a finished run has one slot. The
+!> output of an aborted run contains no valid checkpoint.
 module checkpoint
-  use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int128, int32, int64, real64
+  use kinds, only: int64
   use build_info, only: build_flags
   use sampling_schedule, only: progress_t
   use errors, only: error_t, exit_files, exit_usage, fail
-  use exact_sums, only: exact_sum_t
-  use h5md_layout, only: changes_at_work, checkpoint_group, parameters_group
+  use h5md_layout, only: changes_at_work, checkpoint_group, earlier_changes, parameters_group
   use hdf5_objects, only: hdf5_file_t, scalar
   use hdf5_series, only: long_integer, series_t
   use input_groups, only: group_t, most_written
   use record, only: checksum, counting, reading, record_t, writing
   use run_files, only: is_file, source_of, unfinished
   use settings, only: run_input_t
-  use side_motion, only: piston
   use simulation_state, only: simulation_t
+  use state_record, only: exchange_all, layout
   use system, only: last_problem, synchronize
   use texts, only: eol, growing_text_t, legible, line_at, lower_case, text_t, written
   use variables, only: change_of, on_resume, table
@@ -32,21 +29,20 @@ module checkpoint
   public :: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, mark_as_broken
   public :: put_checkpoint, put_last_checkpoint, read_checkpoint, recall_overrides, recall_input
 
-  integer, parameter :: layout = 10               !! version of the layout of checkpoints; no other version can be read
   character(len=*), parameter :: slots(2) = checkpoint_group//["1", "2"]
   character(len=*), parameter :: current = checkpoint_group//"current"     !! number of the valid slot, or `none`
   integer, parameter :: none = 0
   character(len=*), parameter :: described = checkpoint_group//"input_checksum"
 
-  !> Path of a hard link to the first slot. The link is created after all other links of the file and is never deleted. To delete
-  !> the last link of a group, HDF5 first overwrites the name of the link and then removes the link from a list. If the program were
-  !> killed between the overwriting of the name and the removal of the link, h5dump could not list the file.
+  !> Path of a hard link to the first slot, created after all other links of the file and never deleted. HDF5 deletes the last link
+  !> of a group in two steps, overwriting its name before it removes the link from a list; if the program were killed in between,
+  !> h5dump could not list the file.
   character(len=*), parameter :: kept = checkpoint_group//"kept"
 
 contains
 
-  !> A text that identifies the program. The text contains the version of the layout of checkpoints, and those compiler flags that
-  !> permit inexact arithmetic and can therefore change the results.
+  !> Identifies the program: the version of the checkpoint layout, and those compiler flags that permit inexact arithmetic and can
+  !> therefore change results.
   pure function program() result(text)
     character(len=:), allocatable :: text
 
@@ -55,8 +51,7 @@ contains
     if (index(build_flags, "-ffast-math") + index(build_flags, "-Ofast") > 0) text = text//", fast math"
   end function program
 
-  !> Text of the input that the run uses, with one variable per line. The text does not contain variables that may change on
-  !> `--resume`.
+  !> Text of the input that the run uses, with one variable per line, without variables that may change on `--resume`.
   pure function fixed_input(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -82,14 +77,14 @@ contains
     text = growing%text()
   end function fixed_input
 
-  !> Adds overrides from the command line of the original run, so that users need not repeat these overrides on `--resume`.
-  !> Overrides of variables that may change on `--resume` are not added.
+  !> Adds the overrides of the original run, so that users need not repeat them on `--resume`, except overrides of variables that
+  !> may change on `--resume`; overrides of changes are included.
   subroutine recall_overrides(output, overrides, error)
     character(len=*), intent(in) :: output                       !! path of the output
-    !> Overrides of the present command line, in the form GROUP.VARIABLE=VALUE. The procedure inserts the overrides from the output
-    !> file before the overrides of the present command line.
+    !> Overrides of the present command line, in the form GROUP.VARIABLE=VALUE, before which those from the output file are
+    !> inserted.
     type(text_t), allocatable, intent(inout) :: overrides(:)
-    !> Error if another version of the program wrote the output, or if the text of the input in the output file is damaged.
+    !> Error if another version of the program wrote the output, or if the text of the input in it is damaged.
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     type(text_t) :: override
@@ -111,7 +106,7 @@ contains
     do while (text /= "")
       line = line_at(text, 1)
       text = text(min(len(line) + 1, len(text)) + 1:)
-      if (change_of(variable_of(line)) == on_resume) cycle
+      if (change_of(variable_of(line)) == on_resume .and. index(variable_of(line), "change.") /= 1) cycle
       if (any([(variable_of(given(k)%text) == variable_of(line), k=1, size(given))])) cycle
       override%text = line
       overrides = [overrides, override]           ! see `command_line: take_option`
@@ -119,12 +114,12 @@ contains
     overrides = [overrides, given]
   end subroutine recall_overrides
 
-  !> Reads the texts of the input from an output file. The procedure checks that the texts are undamaged and that this version of
-  !> the program wrote the texts.
+  !> Reads the texts of the input from an output file, checking that they are undamaged and were written by this version of the
+  !> program.
   subroutine recall_input(file, text, overrides, changes, error)
     type(hdf5_file_t), intent(inout) :: file
     character(len=:), allocatable, intent(out) :: text, overrides
-    character(len=:), allocatable, intent(out) :: changes         !! changes made during the run; not allocated if there are none
+    character(len=:), allocatable, intent(out) :: changes         !! changes that the text contains; not allocated if there are none
     type(error_t), allocatable, intent(out) :: error
 
     text = ""
@@ -133,11 +128,11 @@ contains
     if (allocated(error)) return
     call file%fetch_text(parameters_group//"input", text)
     call file%fetch_text(parameters_group//"overrides", overrides)
-    if (file%length(changes_at_work) >= 0) call file%fetch_text(changes_at_work, changes)
+    if (file%length(earlier_changes) >= 0) call file%fetch_text(earlier_changes, changes)
     call check_description(file, error)
   end subroutine recall_input
 
-  !> Reports an error if the texts of the input in the file have changed after the run wrote the texts.
+  !> Reports an error if the texts of the input in the file have been changed since the run wrote them.
   subroutine check_description(file, error)
     type(hdf5_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error
@@ -185,13 +180,12 @@ contains
     call file%link(slots(1), kept)
   end subroutine make_checkpoints
 
-  !> Copies both slots (datasets for one checkpoint each) of another file into a new file. The slots are created in the same order
-  !> as in `make_checkpoints`, because `remove_last` depends on this order.
+  !> Copies both slots of another file into a new one, in the order of `make_checkpoints`, on which `remove_last` depends.
   subroutine copy_checkpoints(file, source)
     type(hdf5_file_t), intent(inout) :: file
     type(hdf5_file_t), intent(inout) :: source
     character(len=:), allocatable :: text
-    type(series_t) :: words
+    type(series_t) :: words, there
     integer :: k
 
     call source%fetch_text(checkpoint_group//"program", text)
@@ -201,16 +195,18 @@ contains
     call file%put(described, description_checksum(file))
     call file%put(current, scalar, [int(checkpoint_number(source), int64)])
     do k = 1, 2
-      words = series_t(slots(k), long_integer)
-      call words%find(source)
-      call words%make(file, words%capacity)
-      call words%copy(file, source, words%capacity)
+      there = series_t(slots(k), long_integer)
+      call there%find(source)
+      words = there
+      call words%make(file, there%capacity)
+      call words%copy(file, source, there, there%capacity)
+      call there%close(source)
+      call words%close(file)
     end do
     call file%link(slots(1), kept)
   end subroutine copy_checkpoints
 
-  !> Writes a checkpoint to the slot that is not valid. After the checkpoint has been stored on the disk, the slot that contains the
-  !> new checkpoint is marked as valid.
+  !> Writes a checkpoint to the invalid slot, and marks it as valid once it has reached the disk.
   subroutine put_checkpoint(file, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -238,15 +234,14 @@ contains
     call file%remove_last(slots(2), before=slots(1))
   end subroutine put_last_checkpoint
 
-  !> Marks a new file as the output of a run that broke off; such a run cannot be resumed.
+  !> Marks a new file as the output of an aborted run, which cannot be resumed.
   subroutine mark_as_broken(file)
     type(hdf5_file_t), intent(inout) :: file
 
     call file%put(current, scalar, [int(none, int64)])
   end subroutine mark_as_broken
 
-  !> Number of the slot that contains the valid checkpoint. The result is `none` if no slot is valid, and -1 if the file does not
-  !> contain the number of the valid slot.
+  !> Number of the valid slot; `none` if no slot is valid, and -1 if the file does not contain this number.
   function checkpoint_number(file) result(number)
     type(hdf5_file_t), intent(inout) :: file
     integer :: number
@@ -265,7 +260,7 @@ contains
     yes = file%length(slots(2)) > 0
   end function has_both_checkpoints
 
-  !> Whether an unfinished output was written by a run that broke off.
+  !> Whether an unfinished output was written by an aborted run.
   function has_broken_off(output) result(yes)
     character(len=*), intent(in) :: output        !! path of the finished output
     logical :: yes
@@ -303,16 +298,16 @@ contains
       call exchange_all(file, record, sim, copy)
       call record%make(file)
     end if
-    call record%begin(writing)
+    call record%begin(writing, file)
     call exchange_all(file, record, sim, copy)
   end subroutine put_slot
 
-  !> Restores a run from its finished or unfinished output. The argument `progress` returns how many samples the output contained at
+  !> Restores a run from its finished or unfinished output. `progress` returns the number of samples that the output contained at
   !> the time of the checkpoint.
   subroutine read_checkpoint(output, input, sim, progress, finished, error)
     character(len=*), intent(in) :: output      !! path of the finished output
     type(run_input_t), intent(in) :: input
-    type(simulation_t), intent(inout) :: sim    !! in: simulation with the box, contact law and species of the input
+    type(simulation_t), intent(inout) :: sim    !! on entry, a simulation with the box, contact law and species of the input
     type(progress_t), intent(out) :: progress
     logical, intent(out) :: finished            !! .true. if the run had already finished
     type(error_t), allocatable, intent(out) :: error
@@ -336,12 +331,31 @@ contains
     call file%close()
     if (allocated(error)) return
     if (.not. sim%features%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
+    call check_changes(sim, source, error)
     call sim%simplify_masses()
     call sim%choose_units()
     call progress%schedule%look_ahead(sim)
   end subroutine read_checkpoint
 
-  !> Reads the valid checkpoint. If the valid checkpoint is damaged, the checkpoint in the other slot is read.
+  !> Reports changes that differ from those already made by the run, and changes whose time has passed.
+  subroutine check_changes(sim, path, error)
+    type(simulation_t), intent(in) :: sim
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+
+    if (sim%changes_made < 0) then
+      call fail(error, exit_usage, path//": belongs to another input: the changes (&change) before the time of the checkpoint, " &
+        //written(sim%time())//", differ; --resume needs the unchanged input, --force starts the run again")
+    else if (allocated(sim%schedule)) then
+      if (sim%changes_made == size(sim%schedule)) return
+      associate (change => sim%schedule(sim%changes_made + 1))
+        if (sim%has_reached(change%time)) call fail(error, exit_usage, change%origin//": its time has passed: the run continues " &
+          //"from time "//written(sim%time())//"; give a later time")
+      end associate
+    end if
+  end subroutine check_changes
+
+  !> Reads the valid checkpoint or, if it is damaged, that in the other slot.
   subroutine read_slot(file, sim, progress, error)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
@@ -353,21 +367,22 @@ contains
     integer(int64) :: words
     integer :: number, trial
 
+    failure = ""
     number = checkpoint_number(file)
     call sim%make_room(sum(sim%species%count))
     blank = sim
     do trial = 1, 2
       sim = blank
       record%name = slots(merge(2, 1, number == 2 .eqv. trial == 1))
-      call record%begin(counting)
+      call record%begin(counting, file)
       call exchange_all(file, record, sim, progress)
       words = file%length(record%name)
       if (words > 0 .and. words /= record%words) then
-        call fail(error, exit_files, file%path//": has other disks than the input now describes: a starting file " &
+        call fail(error, exit_files, file%path//": has other disks than the input now describes: an initial-configuration file " &
           //"(species.file) has changed; --resume needs it unchanged, --force starts the run again")
         return
       end if
-      call record%begin(reading)
+      call record%begin(reading, file)
       call exchange_all(file, record, sim, progress)
       if (any(sim%tag%species < 1 .or. sim%tag%species > size(sim%species) .or. sim%tag%id < 1 .or. sim%tag%id > size(sim%tag))) &
         call file%check(-1, "be read: "//record%name//" has invalid species or numbers of disks")
@@ -391,7 +406,7 @@ contains
     if (.not. allocated(error)) call file%report(error)
   end subroutine check_program
 
-  !> Reports an error if another version of the program wrote the checkpoint, or if the checkpoint belongs to a different input.
+  !> Reports an error if the checkpoint was written by another version of the program or belongs to a different input.
   subroutine check_origin(file, groups, error)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -411,123 +426,5 @@ contains
     call fail(error, exit_usage, file%path//": belongs to another input: there "//legible(line_at(there, k)) &
       //", here "//legible(line_at(here, k))//"; --resume needs the unchanged input, --force starts the run again")
   end subroutine check_origin
-
-  !> Counts, writes or reads the numbers of a checkpoint. Before a checkpoint is read, the box and the species of the simulation
-  !> must be set.
-  subroutine exchange_all(file, record, sim, progress)
-    type(hdf5_file_t), intent(inout) :: file      !! the file is not accessed if the numbers are only counted
-    type(record_t), intent(inout) :: record
-    type(simulation_t), intent(inout), target :: sim
-    type(progress_t), intent(inout) :: progress
-    integer(int64) :: settled
-    integer :: k
-
-    call record%exchange(file, sim%box%epoch)
-    call record%exchange(file, sim%now)
-    settled = merge(1, 0, sim%events_done)
-    call record%exchange(file, settled)
-    sim%events_done = settled == 1
-    call record%exchange(file, sim%epoch_begin)
-    call record%exchange(file, sim%epoch_end)
-    call record%exchange(file, sim%epoch_events)
-    call record%exchange(file, sim%negligible_time)
-    call record%exchange(file, sim%last_advance)
-    call record%exchange(file, sim%events_then)
-    call record%exchange(file, sim%start_energy)
-    call record%exchange(file, sim%reference_energy)
-    call record%exchange(file, sim%typical_speed2)
-    call record%exchange(file, sim%kicks)
-    if (allocated(sim%recycled)) call record%exchange(file, sim%recycled)
-    call record%exchange(file, sim%changes)
-    call exchange_tally()
-    if (any(sim%box%surface%motion%kind == piston)) then
-      call record%exchange(file, sim%box%side%clock)
-      call record%exchange(file, sim%box%side%position)
-      call record%exchange(file, sim%box%side%velocity)
-    end if
-    call exchange_disks()
-    do k = 1, size(progress%schedule)
-      ! The times of the next samples are not stored, because they follow from the intervals in the input.
-      associate (schedule => progress%schedule(k))
-                                                  ! numbers
-        call record%exchange(file, schedule%count)
-        call record%exchange(file, schedule%last_events)
-        call record%exchange(file, schedule%last_time)
-      end associate
-    end do
-    call record%exchange(file, progress%events)
-    call record%seal(file)
-  contains
-
-    !> Counts, writes or reads the sums and counters over all events.
-    subroutine exchange_tally()
-      call sim%tally%make_room(size(sim%box%surface))
-      associate (tally => sim%tally)
-        call record%exchange(file, tally%events)
-        call record%exchange(file, tally%collisions)
-        call record%exchange(file, tally%simultaneous)
-        call record%exchange(file, tally%series)
-        call record%exchange(file, tally%collapse)
-        call exchange_sums(tally%sum)
-        call record%exchange(file, tally%surface_collisions)
-        do k = 1, size(tally%surface_sums, 1)
-          call exchange_sums(tally%surface_sums(k, :))
-        end do
-      end associate
-    end subroutine exchange_tally
-
-    !> Counts, writes or reads the 128-bit integers that represent exact sums.
-    subroutine exchange_sums(sums)
-      type(exact_sum_t), intent(inout) :: sums(:)
-      integer(int128), target :: parts(2*size(sums))
-
-      parts = [sums%units, sums%rare]
-      call record%pass(file, c_loc(parts), 2*size(parts))
-      sums%units = parts(:size(sums))
-      sums%rare = parts(size(sums) + 1:)
-    end subroutine exchange_sums
-
-    !> Counts, writes or reads the state of the disks.
-    subroutine exchange_disks()
-      real(real64), allocatable :: mass(:)
-
-      associate (disk => sim%disk, tag => sim%tag)
-        call record%exchange(file, disk%x(1))
-        call record%exchange(file, disk%x(2))
-        call record%exchange(file, disk%v(1))
-        call record%exchange(file, disk%v(2))
-        call record%exchange(file, disk%clock)
-        call exchange_short(tag%species)
-        call exchange_short(tag%id)
-        call record%exchange(file, tag%collisions)
-        call exchange_short(tag%last_partner)
-        ! If disks have no individual masses and radii, the radii are not stored, because the input contains the radius of each
-        ! species.
-        if (sim%features%own_sizes) call record%exchange(file, disk%radius)
-      end associate
-      settled = merge(1, 0, sim%events_done)
-      do k = 1, merge(1, 0, sim%features%rotation) + merge(2, 0, sim%features%orientation)
-        ! Copies of `settled` make the length of the record depend on whether the run has rotation and orientation, so that a
-        ! checkpoint of a run with other features is detected.
-        call record%exchange(file, settled)
-      end do
-      if (allocated(sim%series)) call record%pass(file, c_loc(sim%series(1)), size(sim%series)*storage_size(sim%series)/64)
-      if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
-      if (.not. sim%features%own_sizes) return
-      mass = sim%masses()                       ! individual masses are stored even if each mass equals the mass of the species
-      call record%exchange(file, mass)
-      if (record%mode == reading) sim%own_mass = mass
-    end subroutine exchange_disks
-
-    !> Counts, writes or reads 32-bit integers, which are stored with 64 bits.
-    subroutine exchange_short(values)
-      integer(int32), intent(inout) :: values(:)
-      integer(int64) :: words(size(values))
-
-      words = values
-      call record%exchange(file, words)
-      values = int(words, int32)
-    end subroutine exchange_short
-  end subroutine exchange_all
 
 end module checkpoint

@@ -1,11 +1,9 @@
-!> Output of a run: this module decides when samples are written, and manages the output file. During the run the name of the output
-!> file is OUT.h5.part, and a lock file prevents other runs from writing to the output file. A file with the name OUT.h5 belongs to
-!> a finished run.
+!> Output of a run: decides when samples are written, and manages the output file. During the run the file is called OUT.h5.part,
+!> and a lock file prevents other runs from writing to it; OUT.h5 is the file of a finished run.
 !>
-!> The layout of an output file never changes after its creation. If the number of samples is known at the start, the file is
-!> created with space for exactly these samples. If the number of samples is unknown, the output file is replaced by a larger file,
-!> with an atomic renaming, whenever its space is used up. At the end of the run, the output file is replaced by a copy without
-!> unused space.
+!> The layout of an output file never changes after its creation. If the number of samples is known at the start, the file has
+!> exactly enough space. Otherwise, whenever the space is used up, an atomic renaming replaces it by a larger file. At the end of
+!> the run it is replaced by a copy without unused space.
 module output
   use kinds, only: int64, never, real64
   use sampling_schedule, only: frames, progress_t, values
@@ -14,14 +12,15 @@ module output
   use errors, only: error_t, exit_files, fail
   use event_log, only: event_log_t
   use evolution, only: limits_t
-  use h5md_layout, only: changes_at_work, event_counter, frame_counter, replaced_file, sample_counter, saved_at, wall_time
+  use h5md_layout, only: earlier_changes, event_counter, frame_counter, replaced_file, sample_counter, saved_at, wall_time
   use hdf5_objects, only: hdf5_file_t, scalar
+  use sample_numbers, only: sample_t
   use sample_values, only: frame_column_t, frame_columns, frame_sample, observable_sample
   use observables, only: observed
   use run_description, only: describe_end, describe_run, describes
   use run_files, only: check_places, check_replaced, is_file, lock, source_of, take_final_name, unfinished, unfinished_new
   use sample_track, only: track_t
-  use samples, only: check_counts, event_series, frame_series, observable_series
+  use samples, only: check_counts, event_samples, event_series, frame_series, observable_series
   use settings, only: run_input_t
   use signals, only: record_signals
   use simulation_state, only: simulation_t
@@ -34,8 +33,8 @@ module output
 
   real(real64), parameter :: longest_wait = 0.05_real64  !! longest time that a sample waits in a buffer while the run is active [s]
   integer, parameter :: events = 3              !! index of the track of the event log, which follows `frames` and `values`
-  !> Treatment of the checkpoints when a new file replaces a file: copied from the old file (`kept`), written for the present state
-  !> (`anew`), or omitted (`dropped`).
+  !> Treatment of the checkpoints when a new file replaces the old one: copied (`kept`), written for the present state (`anew`), or
+  !> omitted (`dropped`).
   integer, parameter :: kept = 1, anew = 2, dropped = 3
 
   type :: output_t
@@ -45,7 +44,7 @@ module output
     type(hdf5_file_t), allocatable, private :: file
     type(track_t), allocatable, private :: track(:)      !! (2 or 3) tracks of frames, observables and, if requested, events
     type(frame_column_t), allocatable, private :: columns(:)  !! columns of the frames
-    !> Whether a copy of the file, without unused space, must be expected at the end of the run
+    !> Whether to expect a copy of the file, without unused space, at the end of the run
     logical, private :: is_copied = .true.
     type(lock_t), private :: lock
     integer(int64), private :: replaced(3) = 0_int64     !! identity of the file that existed at `path` when the run started
@@ -68,7 +67,8 @@ module output
 
 contains
 
-  !> Creates the folders of the output, acquires the lock of the output, and reports files that must not be overwritten.
+  !> Creates the folders of the output, acquires its lock, and reports files that must not be
+  !> overwritten.
   subroutine claim(self, path, error)
     class(output_t), intent(inout) :: self
     character(len=*), intent(in) :: path          !! path of the finished file
@@ -76,7 +76,7 @@ contains
     character(len=:), allocatable :: problem
     logical :: made
 
-    call record_signals()                         ! a sudden end of the program could lose data from now on
+    call record_signals()                         ! from here on, killing the program can lose data
     self%file = hdf5_file_t()
     self%path = path
     self%opened = seconds()
@@ -90,7 +90,7 @@ contains
       if (problem /= "") call fail(error, exit_files, path//": "//problem)
     end if
     if (.not. allocated(error)) call check_places(path, error)
-    ! If a file with the extension `unfinished_new` exists, the file is incomplete, because the run that wrote the file was killed.
+    ! A file with the extension `unfinished_new` is incomplete: the run that wrote it was killed.
     if (.not. allocated(error)) call remove_file(path//unfinished_new)
     self%replaced = identity_of(path)
     if (is_file(path) .and. all(self%replaced == 0) .and. .not. allocated(error)) &
@@ -102,10 +102,12 @@ contains
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim
-    !> .true. allows the run to replace an unfinished output now, and a finished output at the end of the run.
+    !> .true. allows the run to replace an unfinished output now, and a finished output at the end
+    !> of the run
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
-    !> .true. to reserve space only for the first samples, because another run will write all later samples
+    !> .true. to reserve space only for the first samples, because another run will write all later
+    !> ones
     logical, intent(in), optional :: only_start
     integer :: k
 
@@ -170,10 +172,9 @@ contains
     end if
   end subroutine check_room
 
-  !> Opens the output of a resumed run after `claim`. New samples follow the samples that had been written before the checkpoint. If
-  !> a finished run is continued, the finished output is not changed until the continued run has finished. If the description of the
-  !> input in the file differs from the present input, or if the file has less space than a new run would reserve, a new file is
-  !> written.
+  !> Opens the output of a resumed run after `claim`. New samples follow those written before the checkpoint. A finished output
+  !> stays unchanged until the continued run has finished. A new file is written if the input differs from its description in the
+  !> old file, or if the old file has less space than a new run would reserve.
   subroutine resume(self, input, sim, progress, finished, error)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -193,7 +194,7 @@ contains
     call self%file%fetch(wall_time, 1, spent)
     self%spent = spent(1)
     if (.not. finished) call self%file%fetch(replaced_file, 3, self%replaced)
-    if (self%file%length(changes_at_work) >= 0) call self%file%fetch_text(changes_at_work, self%input%changes)
+    if (self%file%length(earlier_changes) >= 0) call self%file%fetch_text(earlier_changes, self%input%changes)
     if (self%file%length(saved_at) >= 0) then
       call self%file%fetch(saved_at, 1, spent)
       self%input%saved_at = spent(1)
@@ -244,7 +245,7 @@ contains
         self%track(events)%planned = planned_events(rule%limits)
       end if
       self%is_copied = any(self%track%planned == 0)
-      ! Collisions with boundaries are logged, too, and do not count as collisions of two disks.
+      ! Collisions with boundaries are logged, too, but do not count as collisions of two disks.
       if (settings%event_log) self%is_copied = self%is_copied .or. (rule%limits%collisions < huge(0_int64) &
         .and. (sim%box%has_obstacles() .or. .not. all(sim%box%periodic)))
     end associate
@@ -256,7 +257,7 @@ contains
     integer(int64) :: n
 
     n = 0
-    if (limits%watches() .or. limits%at_rest .or. limits%time < never) return
+    if (limits%watches() .or. limits%at_rest .or. limits%disks_inside >= 0 .or. limits%time < never) return
     if (max(limits%events, limits%collisions) == huge(n)) n = min(limits%events, limits%collisions)
     if (n == huge(n)) n = 0
   end function planned_events
@@ -270,8 +271,8 @@ contains
     if (yes) yes = self%track(events)%planned == 0
   end function lacks_log
 
-  !> Smallest possible size of the file, in bytes. If the number of samples is unknown, the result allows only for the first and the
-  !> last sample.
+  !> Smallest possible size of the file, in bytes. If the number of samples is unknown, only the
+  !> first and the last are counted.
   function bytes_of_file(self, sim) result(bytes)
     class(output_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -297,7 +298,7 @@ contains
     if (output%lacks_log()) text = text//" without the event log"
   end subroutine estimate_size
 
-  !> Creates a file with a temporary name and writes all contents except tracks and checkpoints.
+  !> Creates a file with a temporary name and writes everything except tracks and checkpoints.
   subroutine create_file(self, file, sim)
     class(output_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -309,7 +310,7 @@ contains
     call file%put(wall_time, scalar, [self%spent])
   end subroutine create_file
 
-  !> Reduces the limits of the simulation, so that the simulation stops when the next sample is due.
+  !> Lowers the limits of the simulation, so that it stops when the next sample is due.
   pure subroutine tighten(self, limits)
     class(output_t), intent(in) :: self
     type(limits_t), intent(inout) :: limits
@@ -318,7 +319,8 @@ contains
     call self%progress%schedule(values)%tighten(limits)
   end subroutine tighten
 
-  !> Takes the samples that are due. The main loop calls `take_due_samples` whenever the simulation has stopped at a limit.
+  !> Takes the samples that are due. The main loop calls this whenever the simulation has stopped at
+  !> a limit.
   subroutine take_due_samples(self, sim, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -347,37 +349,38 @@ contains
     end associate
   end subroutine take_sample
 
-  !> Moves the events in the event log to the output, and empties the log. If the output fails, the next call of `take_due_samples`
-  !> reports the failure.
+  !> Moves the events in the event log to the output, and empties the log. A failure of the output
+  !> is reported by the next call of `take_due_samples`.
   subroutine take_events(self, sim, log)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(event_log_t), intent(inout) :: log
 
     if (log%n == 0) return
-    call self%add(events, log%record(:sum(self%track(events)%series%width()), :log%n), sim)
+    call self%add(events, event_samples(log), sim)
     self%progress%events = self%progress%events + log%n
     log%n = 0
   end subroutine take_events
 
-  !> Adds samples to a track. If the present file has no space for the samples, the present file is first replaced by a larger file.
+  !> Adds samples to a track, after replacing the file by a larger one if there is no space for
+  !> them.
   subroutine add(self, track, samples, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track
-    real(real64), intent(in) :: samples(:, :)     !! (width,count)
+    type(sample_t), intent(in) :: samples
     type(simulation_t), intent(inout) :: sim
     integer(int64) :: capacities(size(self%track))
     logical :: widened
 
     capacities = self%track%capacity
-    capacities(track) = self%track(track)%enlarged(size(samples, 2, int64))
+    capacities(track) = self%track(track)%enlarged(samples%count())
     call self%track(track)%widen(samples, widened)
     if (widened .or. any(capacities > self%track%capacity)) call self%rebuild(capacities, sim, kept)
     call self%track(track)%append(self%file, samples)
   end subroutine add
 
-  !> Commits (writes to the file) the samples that have been in a buffer for at least `least_wait`. If `least_wait` is absent, all
-  !> buffered samples are committed.
+  !> Commits (writes to the file) all buffered samples, or those that have been in a buffer for at
+  !> least `least_wait`.
   subroutine flush_buffers(self, least_wait)
     class(output_t), intent(inout) :: self
     real(real64), intent(in), optional :: least_wait      !! [s]
@@ -391,7 +394,7 @@ contains
     end do
   end subroutine flush_buffers
 
-  !> Replaces the file by a new file in which the tracks have different capacities.
+  !> Replaces the file by a new one in which the tracks have different capacities.
   subroutine rebuild(self, capacities, sim, checkpoints)
     class(output_t), intent(inout) :: self
     integer(int64), intent(in) :: capacities(:)
@@ -438,8 +441,8 @@ contains
     call self%file%report(error)
   end subroutine save
 
-  !> Completes the output of a finished run: checks the file and gives the file its final name. If the completion fails, the run can
-  !> be resumed from the checkpoint in the file, which was written just before the end of the run.
+  !> Completes the output of a finished run: checks the file and gives it its final name. If this fails, the run can be resumed from
+  !> the checkpoint written just before.
   subroutine finish(self, sim, cost, note, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -463,8 +466,8 @@ contains
     if (.not. allocated(error)) call self%release()
   end subroutine finish
 
-  !> Writes the last samples, removes unused space, and records how the run ended. The final checkpoint does not count samples that
-  !> are taken only because the run ends, so that a continued run overwrites these samples.
+  !> Writes the last samples, removes unused space, and records how the run ended. Samples taken only because of the end are not
+  !> counted in the final checkpoint, so that a continued run overwrites them.
   subroutine write_end(self, sim, cost, note, broken)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -487,8 +490,8 @@ contains
     if (.not. broken) call put_last_checkpoint(self%file, sim, before)
   end subroutine write_end
 
-  !> Completes the output of a run that broke off, including the last state of the run. The file keeps the name of an unfinished
-  !> output, OUT.h5.part.
+  !> Completes the output of an aborted run, including its last state. The file keeps the name of an
+  !> unfinished output, OUT.h5.part.
   subroutine break_off(self, sim, cost, note)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

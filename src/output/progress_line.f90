@@ -16,11 +16,11 @@ module progress_line
     private
     real(real64) :: started = 0.0_real64           !! time when the program started [s]
     integer :: n = 0                               !! number of reports so far
-    ! Circular buffers: clock time, completed fraction and number of collisions at each of the last reports
-    real(real64) :: clock(0:window - 1) = 0.0_real64       !! [s]
+    ! Circular buffers of the values at each of the last reports
+    real(real64) :: clock(0:window - 1) = 0.0_real64       !! clock time [s]
     real(real64) :: share(0:window - 1) = 0.0_real64       !! completed fraction of the run
-    integer(int64) :: collisions(0:window - 1) = 0_int64
-    integer(int64) :: events(0:window - 1) = 0_int64       !! number of events at each of the last reports
+    integer(int64) :: collisions(0:window - 1) = 0_int64   !! number of collisions of disks
+    integer(int64) :: events(0:window - 1) = 0_int64       !! number of events
   contains
     procedure :: start
     procedure :: report
@@ -64,11 +64,12 @@ contains
     call self%show(trim(line))
   end subroutine report
 
-  !> Whether almost all events between two reports were bounces on walls that dissipate energy, under gravity.
+  !> Whether almost all events between two reports were bounces on walls that dissipate energy, under
+  !> gravity.
   pure function bounces(self, sim, first, last) result(yes)
     class(progress_line_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
-    integer, intent(in) :: first, last                !! positions of the two reports
+    integer, intent(in) :: first, last                !! positions of the earlier and the later report in the buffers
     logical :: yes
     integer(int64), parameter :: many = 100           ! number of events per collision
 
@@ -76,8 +77,8 @@ contains
       .and. self%events(last) - self%events(first) > many*(1 + self%collisions(last) - self%collisions(first))
   end function bounces
 
-  !> Records the present time, the completed fraction of the run and the number of collisions. A report calculates average rates
-  !> from the difference between the latest record and an earlier record.
+  !> Records the present time, the completed fraction of the run and the numbers of collisions and
+  !> events. A report calculates rates from the difference to an earlier record.
   subroutine remember(self, sim, stop_rule)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -92,7 +93,7 @@ contains
     self%n = self%n + 1
   end subroutine remember
 
-  !> Converts a number of seconds to a text of the form h:mm:ss.
+  !> Converts a number of seconds to the form h:mm:ss.
   pure function clock_text(s) result(text)
     real(real64), intent(in) :: s
     character(len=:), allocatable :: text

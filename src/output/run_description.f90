@@ -4,9 +4,10 @@ module run_description
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use kinds, only: int32, int64, real64
   use build_info, only: build_flags, git_commit
+  use changes, only: text_of_change
   use disks, only: names_of
-  use h5md_layout, only: all_disks, box_group, changes_at_work, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
-    parameters_group, provenance, saved_at, species_counts, species_names, wall_time
+  use h5md_layout, only: all_disks, box_group, changes_at_work, disk_id, disk_mass, disk_radius, disk_species, earlier_changes, &
+    observables_group, parameters_group, provenance, saved_at, species_counts, species_names, wall_time
   use hdf5_handle, only: hdf5_version
   use hdf5_objects, only: hdf5_file_t, scalar
   use input_surfaces, only: has_many
@@ -27,21 +28,22 @@ module run_description
 
 contains
 
-  !> Writes all constant contents, with placeholders for values that are known only at the end.
+  !> Writes all datasets that are not time series; values known only at the end of the run are
+  !> written as placeholders.
   subroutine describe_run(file, input, sim)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(in) :: sim
     integer :: k, range(2)
 
-    call describe_format()
-    call describe_box()
-    call describe_disks()
-    call describe_origin()
-    call describe_input()
+    call describe_format(file)
+    call describe_box(file, sim)
+    call describe_disks(file, sim)
+    call describe_origin(file, input)
+    call describe_input(file, input)
     call file%put(species_names, names_of(sim%species))
     call file%put(species_counts, [size(sim%species)], int(sim%species%count, int32))
-    call describe_populations()
+    call describe_populations(file, sim)
     do k = 1, size(obstacle_groups)
       range = range_of(input%groups, obstacle_groups(k:k))
       call describe_table(file, input%groups(range(1):range(2)))
@@ -49,100 +51,122 @@ contains
     end do
     call file%put(parameters_group//"seed", scalar, [input%settings%run%seed])
     call describe_end(file, input%settings%run%threads, 0.0_real64, [0.0_real64, 0.0_real64], "")
-  contains
-
-    !> Writes the version of the format, the author and the creator, as H5MD requires.
-    subroutine describe_format()
-      call file%make_group("h5md/author")
-      call file%make_group("h5md/creator")
-      call file%make_group("h5md/modules/thermodynamics")
-      call file%put("h5md@version", [2], [1_int32, 1_int32])
-      call file%put("h5md/author@name", author())
-      call file%put("h5md/creator@name", "ricochet")
-      call file%put("h5md/creator@version", program_version)
-      call file%put("h5md/modules/thermodynamics@version", [2], [1_int32, 0_int32])
-    end subroutine describe_format
-
-    !> Writes the boundary conditions and edges of the box.
-    subroutine describe_box()
-      character(len=8) :: boundary(2)
-
-      boundary = merge("periodic", "none    ", sim%box%periodic)
-      call file%make_group(box_group)
-      call file%put(box_group//"@dimension", scalar, [2_int32])
-      call file%put(box_group//"@boundary", boundary)
-      call file%put(box_group//"/edges", [2], sim%box%edges())
-      call file%put(box_group//"/lower", [2], sim%box%lower)
-    end subroutine describe_box
-
-    !> Writes the constant properties of the disks, in the order of the input.
-    subroutine describe_disks()
-      integer(int32), allocatable :: numbers(:)
-      real(real64), allocatable :: sizes(:)
-      integer(int32) :: i
-
-      allocate (numbers(sim%n_disks()), sizes(sim%n_disks()))
-      numbers = [(i, i=1, sim%n_disks())]
-      call file%put(disk_id, [size(numbers)], numbers)
-      numbers(sim%tag%id) = sim%tag%species
-      call file%put(disk_species, [size(numbers)], numbers)
-      sizes(sim%tag%id) = sim%masses()
-      call file%put(disk_mass, [size(sizes)], sizes)
-      sizes(sim%tag%id) = sim%disk%radius
-      call file%put(disk_radius, [size(sizes)], sizes)
-    end subroutine describe_disks
-
-    !> Writes the text of the input, and the value of every variable that the run uses.
-    subroutine describe_input()
-      character(len=:), allocatable :: group
-      integer :: g, k
-
-      do g = 1, size(input%groups)
-        associate (own => input%groups(g))
-          if (any(obstacle_groups == own%name)) cycle     ! obstacles are written by `describe_table`
-          group = parameters_group//trim(own%name)
-          if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
-          call file%make_group(group)
-          do k = 1, size(own%values)
-            if (.not. changes_nothing(trim(own%name)//"."//own%values(k)%name)) call describe_value(file, group, own%values(k))
-          end do
-        end associate
-      end do
-      call file%put(parameters_group//"input", input%text)
-      call file%put(parameters_group//"overrides", overrides_text(input))
-      if (allocated(input%changes)) call file%put(changes_at_work, input%changes)
-    end subroutine describe_input
-
-    !> Writes the dimension and the number of particles, which the thermodynamics module of H5MD requires for each group of
-    !> observables.
-    subroutine describe_populations()
-      character(len=:), allocatable :: group
-      integer(int32) :: n
-      integer :: s
-
-      do s = 0, size(sim%species)
-        group = observables_group//all_disks
-        n = sim%n_disks()
-        if (s > 0) group = observables_group//sim%species(s)%name
-        if (s > 0) n = sim%species(s)%count
-        call file%make_group(group)
-        call file%put(group//"@dimension", scalar, [2_int32])
-        call file%put(group//"/particle_number", scalar, [n])
-      end do
-    end subroutine describe_populations
-
-    !> Writes data about the build of the program and the computer that created the file.
-    subroutine describe_origin()
-      call file%make_group(provenance)
-      call file%put(provenance//"@program_version", program_version)
-      if (.not. input%saved_at < 0) call file%put(saved_at, scalar, [input%saved_at])
-      call file%put(provenance//"@git_commit", git_commit)
-      call file%put(provenance//"@compiler", compiler_version())
-      call file%put(provenance//"@flags", build_flags)
-      call file%put(provenance//"@hdf5_version", hdf5_version())
-      call file%put(provenance//"@host", host_name())
-    end subroutine describe_origin
   end subroutine describe_run
+
+  !> Writes the version of the format, the author and the creator, as H5MD requires.
+  subroutine describe_format(file)
+    type(hdf5_file_t), intent(inout) :: file
+
+    call file%make_group("h5md/author")
+    call file%make_group("h5md/creator")
+    call file%make_group("h5md/modules/thermodynamics")
+    call file%put("h5md@version", [2], [1_int32, 1_int32])
+    call file%put("h5md/author@name", author())
+    call file%put("h5md/creator@name", "ricochet")
+    call file%put("h5md/creator@version", program_version)
+    call file%put("h5md/modules/thermodynamics@version", [2], [1_int32, 0_int32])
+  end subroutine describe_format
+
+  !> Writes the boundary conditions and edges of the box.
+  subroutine describe_box(file, sim)
+    type(hdf5_file_t), intent(inout) :: file
+    type(simulation_t), intent(in) :: sim
+    character(len=8) :: boundary(2)
+
+    boundary = merge("periodic", "none    ", sim%box%periodic)
+    call file%make_group(box_group)
+    call file%put(box_group//"@dimension", scalar, [2_int32])
+    call file%put(box_group//"@boundary", boundary)
+    call file%put(box_group//"/edges", [2], sim%box%edges())
+    call file%put(box_group//"/lower", [2], sim%box%lower)
+  end subroutine describe_box
+
+  !> Writes the constant properties of the disks, in the order of the input.
+  subroutine describe_disks(file, sim)
+    type(hdf5_file_t), intent(inout) :: file
+    type(simulation_t), intent(in) :: sim
+    integer(int32), allocatable :: numbers(:)
+    real(real64), allocatable :: sizes(:)
+    integer(int32) :: i
+
+    allocate (numbers(sim%n_disks()), sizes(sim%n_disks()))
+    numbers = [(i, i=1, sim%n_disks())]
+    call file%put(disk_id, [size(numbers)], numbers)
+    numbers(sim%tag%id) = sim%tag%species
+    call file%put(disk_species, [size(numbers)], numbers)
+    sizes(sim%tag%id) = sim%masses()
+    call file%put(disk_mass, [size(sizes)], sizes)
+    sizes(sim%tag%id) = sim%disk%radius
+    call file%put(disk_radius, [size(sizes)], sizes)
+  end subroutine describe_disks
+
+  !> Writes the text of the input, and the value of every variable that the run uses.
+  subroutine describe_input(file, input)
+    type(hdf5_file_t), intent(inout) :: file
+    type(run_input_t), intent(in) :: input
+    character(len=:), allocatable :: group, changes
+    integer :: g, k
+
+    do g = 1, size(input%groups)
+      associate (own => input%groups(g))
+        if (any(obstacle_groups == own%name)) cycle     ! obstacles are written by `describe_table`
+        group = parameters_group//trim(own%name)
+        if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
+        call file%make_group(group)
+        do k = 1, size(own%values)
+          if (.not. changes_nothing(trim(own%name)//"."//own%values(k)%name)) call describe_value(file, group, own%values(k))
+        end do
+      end associate
+    end do
+    call file%put(parameters_group//"input", input%text)
+    call file%put(parameters_group//"overrides", overrides_text(input))
+    changes = ""
+    if (allocated(input%changes)) then
+      changes = input%changes
+      call file%put(earlier_changes, changes)
+    end if
+    if (allocated(input%settings%schedule)) then
+      do k = 1, size(input%settings%schedule)
+        changes = changes//text_of_change(input%settings%schedule(k))
+      end do
+    end if
+    if (changes /= "") call file%put(changes_at_work, changes)
+  end subroutine describe_input
+
+  !> Writes the dimension and the number of particles, which the thermodynamics module of H5MD requires for each group of
+  !> observables.
+  subroutine describe_populations(file, sim)
+    type(hdf5_file_t), intent(inout) :: file
+    type(simulation_t), intent(in) :: sim
+    character(len=:), allocatable :: group
+    integer(int32) :: n
+    integer :: s
+
+    do s = 0, size(sim%species)
+      group = observables_group//all_disks
+      n = sim%n_disks()
+      if (s > 0) group = observables_group//sim%species(s)%name
+      if (s > 0) n = sim%species(s)%count
+      call file%make_group(group)
+      call file%put(group//"@dimension", scalar, [2_int32])
+      if (.not. sim%features%open) call file%put(group//"/particle_number", scalar, [n])    ! otherwise an observable
+    end do
+  end subroutine describe_populations
+
+  !> Writes data about the build of the program and the computer that created the file.
+  subroutine describe_origin(file, input)
+    type(hdf5_file_t), intent(inout) :: file
+    type(run_input_t), intent(in) :: input
+
+    call file%make_group(provenance)
+    call file%put(provenance//"@program_version", program_version)
+    if (.not. input%saved_at < 0) call file%put(saved_at, scalar, [input%saved_at])
+    call file%put(provenance//"@git_commit", git_commit)
+    call file%put(provenance//"@compiler", compiler_version())
+    call file%put(provenance//"@flags", build_flags)
+    call file%put(provenance//"@hdf5_version", hdf5_version())
+    call file%put(provenance//"@host", host_name())
+  end subroutine describe_origin
 
   !> Name of the user, from the environment variables.
   function author() result(name)
@@ -155,8 +179,8 @@ contains
     if (name == "") name = "unknown"
   end function author
 
-  !> Whether the results of a run are independent of a variable. Only `run.threads` has no influence on the results; the parameters
-  !> in the output file therefore do not contain `run.threads`.
+  !> Whether a variable has no influence on the results of a run. Only `run.threads` has none, and is therefore not among the
+  !> parameters in the output file.
   pure function changes_nothing(variable) result(yes)
     character(len=*), intent(in) :: variable      !! name of the variable, or a text that begins with this name
     logical :: yes
@@ -189,7 +213,7 @@ contains
     yes = text == input%text .and. overrides == overrides_text(input)
   end function describes
 
-  !> Writes the value of one variable, if the variable has a value.
+  !> Writes the value of one variable, if it has one.
   subroutine describe_value(file, group, value)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: group
@@ -219,8 +243,8 @@ contains
     end select
   end subroutine describe_value
 
-  !> Writes all groups of one name as a table, with a dataset for each variable. If a variable has two choices, the dataset has the
-  !> name of the second choice, and contains 1 for groups with the second choice and 0 for groups with the first choice.
+  !> Writes all groups of one name as a table, with a dataset for each variable. For a variable with two choices, the dataset is
+  !> named after the second choice, and contains 1 for groups with this choice and 0 for the others.
   subroutine describe_table(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -235,7 +259,7 @@ contains
       associate (row => table(groups(1)%values(k)%row))
         path = parameters_group//trim(row%group)//"/"
         second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
-        ! The variable `file` is omitted, because `describe_rows` stores the obstacles that the file describes.
+        ! `file` is omitted, because `describe_rows` stores the obstacles that the file describes.
         if (row%name == "file") cycle
         if (row%kind == "text") then
           do g = 1, n
@@ -245,7 +269,8 @@ contains
           if (second /= "") call file%put(path//second, [n], merge(1_int32, 0_int32, texts == second))
         else
           if (.not. any([(groups(g)%values(k)%is_set(), g=1, n)])) cycle
-          ! Lists of points are omitted, because `describe_rows` stores the obstacles that follow from a list of points.
+          ! Lists of points are omitted, because `describe_rows` stores the obstacles that follow
+          ! from them.
           if (row%size == 0) cycle
           values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! NaN if a group has no value
           do g = 1, n
@@ -259,9 +284,9 @@ contains
     end do
   end subroutine describe_table
 
-  !> Writes a table of all obstacles in the groups of one name, in the order of their codes. The table contains the geometry of each
-  !> obstacle and the number of the group of the obstacle. A table of obstacles is needed in addition to the groups, because one
-  !> group can describe several obstacles by a file or a polyline.
+  !> Writes a table of all obstacles in the groups of one name, in the order of their boundary ids: the geometry of each, and the
+  !> number of its group. The groups alone are not sufficient, because a file or a polyline describes several obstacles in one
+  !> group.
   subroutine describe_rows(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)

@@ -1,16 +1,17 @@
-!> Defines the series of which a frame, a sample of the observables and a record of the event log consist. The order of the series
-!> agrees with the order of the values in the module `sample_values`.
+!> Defines the series of which a frame, a sample of the observables and an event of the event log consist.
 module samples
   use kinds, only: int32, int64, largest_exact
   use errors, only: error_t, exit_broken, fail
+  use event_log, only: event_log_t
   use h5md_layout, only: disks_group, events_group, observables_group, position, step_of, time_of, value_of
   use hdf5_series, only: double_precision, long_integer, series_t, short_integer, single_precision
+  use sample_numbers, only: sample_t
   use sample_values, only: frame_column_t
   use observables, only: observable_list_t
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: frame_series, observable_series, event_series, check_counts
+  public :: frame_series, observable_series, event_series, event_samples, check_counts
 
 contains
 
@@ -57,7 +58,19 @@ contains
       series_t(events_group//"momentum_change", double_precision, 1, [2, 1])]
   end function event_series
 
-  !> Reports an error if a counter of the simulation is too large to be represented exactly as a real number in a sample.
+  !> The events of the log as samples: times, impulses and changes of momentum, and the two partners.
+  function event_samples(log) result(samples)
+    type(event_log_t), intent(in) :: log
+    type(sample_t) :: samples
+
+    ! With `source=` and this vector subscript, gfortran 12 allocates wrong values.
+    allocate (samples%reals(4, log%n), samples%integers(2, log%n))
+    samples%reals = log%record([1, 4, 5, 6], :log%n)
+    samples%integers = int(log%record(2:3, :log%n), int64)
+  end function event_samples
+
+  !> Reports an error if a counter of the simulation is too large to be represented exactly as a
+  !> real number in a sample.
   subroutine check_counts(sim, error)
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
@@ -66,8 +79,8 @@ contains
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      ! The number of periods that a disk has moved must be smaller than `largest_exact`, because a frame may contain this number
-      ! plus one.
+      ! An image counter must be smaller than `largest_exact`, because a frame may contain this
+      ! number plus one.
       too_far = too_far .or. any(abs(sim%extra(i)%image) >= largest_exact)
     end do
     if (sim%tally%events > int(largest_exact, int64) .or. too_far) &

@@ -1,5 +1,6 @@
-!> Sampling schedules. Samples are due at multiples of a time, of a number of collisions or of a number of events, at given times,
-!> and at the start and the end of a run. The module also defines the type that describes the progress of the output.
+!> Sampling schedules. Samples are due at multiples of a time, of a number of collisions or of a
+!> number of events, at given times, and at the start and the end of a run. The module also defines
+!> the progress of the output.
 module sampling_schedule
   use kinds, only: int64, never, real64
   use evolution, only: limits_t
@@ -16,9 +17,9 @@ module sampling_schedule
   integer, parameter :: units_lost = 4  !! times that differ by at most this number of units in the last place are treated as equal
 
   type :: schedule_t
-    !> Intervals of the time, of the number of collisions and of the number of events; none of the intervals needs to be an integer.
+    !> Intervals between samples: in time, in collisions and in events. They need not be integers.
     real(real64) :: every(3) = never
-    type(sampling_t) :: chosen                    !! sampling schedule from the input, with the given times
+    type(sampling_t) :: chosen                    !! sampling schedule as in the input, including its list of times
     integer(int64) :: count = 0                   !! number of samples taken; the first sample is due at the start
     real(real64) :: next(3) = never               !! time, number of collisions and number of events of the next samples
     real(real64) :: last_time = -1.0_real64       !! time of the last sample [time]
@@ -33,8 +34,8 @@ module sampling_schedule
     procedure, private :: next_time, number_within
   end type schedule_t
 
-  !> Progress of the output: the numbers of samples and of logged events that have been written. A run can be resumed from the
-  !> progress of the output and the state of the simulation.
+  !> Progress of the output: the numbers of samples and of logged events written so far. Together
+  !> with the state of the simulation, it is sufficient to resume a run.
   type :: progress_t
     type(schedule_t) :: schedule(2)               !! schedules of frames and of observables
     integer(int64) :: events = 0                  !! number of events written to the event log
@@ -47,7 +48,7 @@ module sampling_schedule
 
 contains
 
-  !> Progress of the output at the start of a run, when no sample has been written.
+  !> Progress of the output at the start of a run, before any sample.
   pure function new_progress(settings) result(progress)
     type(settings_t), intent(in) :: settings
     type(progress_t) :: progress
@@ -59,8 +60,8 @@ contains
     end do
   contains
 
-    !> Converts the intervals in the input to intervals of the time, of the number of collisions and of the number of events. An
-    !> interval in collisions per disk is converted to an interval of the number of collisions.
+    !> Converts the intervals in the input to intervals of the time, of the number of collisions and
+    !> of the number of events. An interval in collisions per disk becomes one in collisions.
     pure function intervals(every)
       real(real64), intent(in) :: every(:)        !! see `settings: sampled_by`
       real(real64) :: intervals(3)
@@ -79,7 +80,7 @@ contains
       .or. any([sim%tally%collisions, sim%tally%events] >= self%next(by_collisions:))
   end function is_due
 
-  !> Whether the present state is new, so that no sample of it has been taken.
+  !> Whether no sample of the present state has been taken.
   pure function is_new(self, sim) result(yes)
     class(schedule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -99,8 +100,8 @@ contains
     call self%look_ahead(sim)
   end subroutine take
 
-  !> Finds the time and the numbers of collisions and events at which the next samples are due. A sample may be due at the present
-  !> time only if further events may occur and no sample has been taken at the present time.
+  !> Finds the time and the numbers of collisions and events at which the next samples are due. At
+  !> the present time, a sample is due only if none has been taken and further events may occur.
   elemental subroutine look_ahead(self, sim)
     class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -122,10 +123,10 @@ contains
     limits%sampled = max(limits%sampled, self%last_time)
   end subroutine tighten
 
-  !> Time of the next sample: the first sampling time t with t >= `time` and t > `past`. Sampling times are the multiples of the
-  !> interval, the logarithmic sampling times, and the given times. Multiples of the interval are calculated as products, because
-  !> sums would accumulate rounding errors. If several sampling times differ only by rounding errors, a single sample is taken, at
-  !> the last of these times.
+  !> Time of the next sample: the first sampling time t with t >= `time` and t > `past`. Sampling
+  !> times are the multiples of the interval, the logarithmic and the given times. Multiples are
+  !> calculated as products, because sums would accumulate rounding errors. Of several sampling
+  !> times that differ only by rounding errors, the last one is used.
   pure function next_time(self, time, past) result(next)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: time, past        !! [time]
@@ -157,7 +158,7 @@ contains
     end do
   contains
 
-    !> Whether the time t is equal to or later than `time`, and later than `past` by more than rounding errors.
+    !> Whether the time t is not before `time`, and later than `past` by more than rounding errors.
     pure logical function is_ahead(t)
       real(real64), intent(in) :: t
 
@@ -184,8 +185,8 @@ contains
     end function first_ahead
   end function next_time
 
-  !> The smallest number of collisions (or events) above n at which a multiple of the interval `every` is reached. If the limit of
-  !> the stop rule equals the multiple of `every`, the run ends at the returned number of collisions (or events).
+  !> Smallest number of collisions (or events) above n at which a multiple of the interval `every`
+  !> is reached. If this multiple is also the limit of the stop rule, the run ends there.
   elemental function next_number(n, every) result(next)
     integer(int64), intent(in) :: n
     real(real64), intent(in) :: every
@@ -201,10 +202,9 @@ contains
     next = whole_collisions(multiple*every)
   end function next_number
 
-  !> Number of samples of a run if this number is known at the start, otherwise 0. The number of samples is known if two conditions
-  !> hold: the schedule has at most one interval, and the only stop rule of the run limits the quantity (time, collisions or events)
-  !> in which the interval is measured. If the schedule contains given or logarithmic sampling times, the stop rule must limit the
-  !> time.
+  !> Number of samples of a run if it is known at the start, otherwise 0. It is known if the
+  !> schedule has at most one interval and the only stop rule limits the same quantity: time,
+  !> collisions or events. If sampling times are given or logarithmic, this quantity must be the time.
   elemental function planned(self, limits) result(n)
     class(schedule_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! limits of the run
@@ -217,15 +217,15 @@ contains
     limited = [limits%time < never, limits%collisions < huge(n), limits%events < huge(n)]
     n = 0
     if (.not. any(given)) n = 2
-    if (count(given) /= 1 .or. any(given .neqv. limited) .or. limits%watches()) return
+    if (count(given) /= 1 .or. any(given .neqv. limited) .or. limits%watches() .or. limits%disks_inside >= 0) return
     if (given(by_time) .and. .not. chooses) n = multiples_within(limits%time, self%every(by_time))
     if (chooses) n = self%number_within(limits%time)
     if (given(by_collisions)) n = numbers_within(limits%collisions, self%every(by_collisions))
     if (given(by_events)) n = numbers_within(limits%events, self%every(by_events))
   end function planned
 
-  !> Number of times from 0 to t at which samples are due, including 0 and t. The result is 0 if there are more than `too_many` such
-  !> times, because the output does not reserve space for so many samples.
+  !> Number of times from 0 to t, both included, at which samples are due; 0 if there are more than
+  !> `too_many`, for which the output does not reserve space.
   pure function number_within(self, t) result(n)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: t                 !! [time]
@@ -243,8 +243,8 @@ contains
     if (n > too_many) n = 0
   end function number_within
 
-  !> Number of multiples of dt from 0 to t, including 0 and t. The result is 0 if there are more than `too_many` multiples, because
-  !> the output does not reserve space for so many samples.
+  !> Number of multiples of dt from 0 to t, both included; 0 if there are more than `too_many`, for
+  !> which the output does not reserve space.
   pure function multiples_within(t, dt) result(n)
     real(real64), intent(in) :: t, dt
     integer(int64) :: n
@@ -258,7 +258,7 @@ contains
     n = n + 1
   end function multiples_within
 
-  !> Number of samples between 0 collisions (or events) and a limit of collisions (or events), including the samples at 0 and at the
+  !> Number of samples from 0 collisions (or events) up to a limit, including those at 0 and at the
   !> limit.
   pure function numbers_within(limit, every) result(n)
     integer(int64), intent(in) :: limit

@@ -1,22 +1,22 @@
-!> Compares and corrects copies of disks after each time window. A domain compares its copies of disks with the original disks,
-!> which other domains own. A copy is wrong if the copy has not moved in the same way as the original disk. If a disk that the
-!> domain owns can have touched a wrong copy, the window is invalid. If the window is valid, wrong copies are corrected. The page
-!> docs/explanation/algorithm.md proves that the criterion for valid windows is sufficient.
+!> Compares and corrects ghosts (copies of disks owned by neighbouring domains) after each time
+!> window. A ghost is wrong if it has moved differently from its original. If a disk owned by the
+!> domain can have touched a wrong ghost, the window is invalid; otherwise wrong ghosts are
+!> corrected. The proof that this criterion is sufficient is in docs/explanation/algorithm.md.
 module domain_borders
   use kinds, only: int16, int32, int64
-  use domains, only: correction_t, domain_t, forever, list_copies, slot_of_copy
+  use domains, only: correction_t, domain_t, forever, list_ghosts, slot_of_ghost
   use partners, only: nothing
   use histories, only: history_t
   implicit none
   private
-  public :: compare_copies, correct_copies
+  public :: compare_ghosts, correct_ghosts
 
 contains
 
-  !> Determines whether a disk that the k-th domain owns can have touched a disk whose copy in this domain was wrong or missing. The
-  !> procedure also lists the corrections for the copies in this domain. For this purpose the procedure reads the states of the
-  !> neighbouring domains.
-  subroutine compare_copies(domain, k)
+  !> Determines whether a disk owned by the k-th domain can have touched a wrong or missing ghost,
+  !> and lists the corrections for the ghosts of this domain, reading the states of the neighbouring
+  !> domains.
+  subroutine compare_ghosts(domain, k)
     type(domain_t), intent(inout) :: domain(:)
     integer(int32), intent(in) :: k
     integer(int32) :: m, found
@@ -28,15 +28,15 @@ contains
       do m = 1, size(self%neighbour)
         if (self%valid) call compare(self, domain(self%neighbour(m)), found)
       end do
-      if (found < self%engine%histories%n_copies()) self%valid = .false.  ! the owner of a copy was not found
+      if (found < self%engine%histories%n_ghosts()) self%valid = .false.  ! the owner of a ghost was not found
     end associate
-  end subroutine compare_copies
+  end subroutine compare_ghosts
 
-  !> Compares the copies in a domain with the original disks that one neighbouring domain owns.
+  !> Compares the ghosts in a domain with the original disks of one neighbouring domain.
   subroutine compare(self, other, found)
     type(domain_t), intent(inout) :: self
     type(domain_t), intent(in) :: other
-    integer(int32), intent(inout) :: found         !! number of copies whose owners have been found
+    integer(int32), intent(inout) :: found         !! number of ghosts whose owners have been found
     integer(int32) :: r, s, t, cell(2), shift(2)
     logical :: met, near, same
 
@@ -45,13 +45,13 @@ contains
       do r = 1, theirs%n_histories
         if (.not. theirs%history(r)%own) cycle
         t = theirs%history(r)%slot
-        s = slot_of_copy(self, other%sim%tag(t)%id)
+        s = slot_of_ghost(self, other%sim%tag(t)%id)
         cell = modulo(other%sim%tag(t)%cell + shift - 1, self%patch%whole) + 1
         if (s > 0) then
           found = found + 1
           associate (history => mine%history(mine%history_of(s)))
             same = history%digest == theirs%history(r)%digest .and. same_state() &
-              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a copy that has left the patch must be removed or corrected
+              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a ghost that has left the patch must be removed or corrected
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
             near = came_near(theirs%history(r), met)
             if (.not. met) met = mine%could_have_met(int(history%low, int32), int(history%high, int32))
@@ -68,8 +68,9 @@ contains
     end associate
   contains
 
-    !> Whether a disk of the neighbouring domain, in any periodic image, was inside the patch during the window. The argument `met`
-    !> becomes .true. if the disk could have touched a disk that this domain owns.
+    !> Whether a disk of the neighbouring domain, in any periodic image, was inside the extended
+    !> domain during the window. `met` becomes .true. if it could have touched a disk owned by this
+    !> domain.
     function came_near(history, met) result(near)
       type(history_t), intent(in) :: history
       logical, intent(out) :: met
@@ -90,8 +91,8 @@ contains
       end do
     end function came_near
 
-    !> Whether the copy with the index s in this domain and the disk with the index t in the neighbouring domain have the same
-    !> state, including the last collision partner.
+    !> Whether the ghost with the index s in this domain and the disk with the index t in the
+    !> neighbouring domain have the same state, including the last collision partner.
     pure function same_state() result(yes)
       logical :: yes
 
@@ -106,7 +107,8 @@ contains
       yes = all(transfer(self%sim%extra(s), [0_int64]) == transfer(other%sim%extra(t), [0_int64]))
     end function same_state
 
-    !> Adds the true state of a disk, which has the index t in the neighbouring domain, to the list of corrections.
+    !> Adds the true state of the disk with the index t in the neighbouring domain to the list of
+    !> corrections.
     subroutine add_correction()
       if (.not. allocated(self%corrections)) allocate (self%corrections(256))
       if (self%n_corrections == size(self%corrections)) self%corrections = [self%corrections, self%corrections]
@@ -120,9 +122,9 @@ contains
     end subroutine add_correction
   end subroutine compare
 
-  !> Applies the corrections: updates copies, adds copies of disks that have entered the patch, and removes copies of disks that
-  !> have left the patch.
-  subroutine correct_copies(self)
+  !> Applies the corrections: updates ghosts, adds ghosts of disks that have entered the extended
+  !> domain, and removes ghosts of disks that have left it.
+  subroutine correct_ghosts(self)
     type(domain_t), intent(inout) :: self
     integer(int32), allocatable :: waiting(:)      ! (n_waiting) indices of disks whose events have to be predicted
     integer(int32) :: k, n_waiting, slot
@@ -143,7 +145,7 @@ contains
       call self%engine%search%predict(self%sim, waiting(k))
       call self%engine%queue%schedule(self%sim%disk, self%sim%tag, waiting(k))
     end do
-    call list_copies(self)
+    call list_ghosts(self)
     self%n_corrections = 0
   contains
 
@@ -159,7 +161,7 @@ contains
       end if
       if (s == 0) then
         s = self%vacant
-        self%valid = s > 0 .and. self%valid          ! without a vacant slot, the domain has to be loaded again
+        self%valid = s > 0 .and. self%valid          ! without a vacant slot, the domain must be loaded again
         if (s == 0) return
         self%vacant = self%global_index(s)
       else if (self%patch%holds(self%sim%tag(s)%cell)) then
@@ -178,7 +180,7 @@ contains
       waiting(n_waiting) = s
     end subroutine apply_correction
 
-    !> Removes the copy with the index s, because the original disk has left the patch.
+    !> Removes the ghost with the index s, whose original has left the extended domain.
     subroutine leave(s)
       integer(int32), intent(in) :: s
 
@@ -191,6 +193,6 @@ contains
       self%global_index(s) = self%vacant
       self%vacant = s
     end subroutine leave
-  end subroutine correct_copies
+  end subroutine correct_ghosts
 
 end module domain_borders

@@ -1,6 +1,6 @@
-!> Spatial decomposition of a simulation into domains. The columns of cells are grouped into slabs, and each slab is divided into
-!> rectangles that contain about equal numbers of disks. Each rectangle is a domain. The patch of a domain consists of its rectangle
-!> and of the halo of cells around the rectangle.
+!> Spatial decomposition of a simulation into domains. The columns of cells are grouped into slabs,
+!> and each slab is divided into rectangles with about equal numbers of disks. Each rectangle is a
+!> domain; with the halo of cells around it, it forms the extended domain, also called its patch.
 module domain_cuts
   use kinds, only: int16, int32, real64
   use cell_faces, only: patch_t
@@ -23,7 +23,8 @@ module domain_cuts
 
 contains
 
-  !> Divides the box into at most `wanted` domains for a given number of threads. Each domain is wider than two halos.
+  !> Divides the box into at most `wanted` domains, each wider than two halos, for a given number of
+  !> threads.
   subroutine cut(self, whole, periodic, cell, wanted, threads, halo)
     class(domain_cuts_t), intent(inout) :: self
     type(patch_t), intent(in) :: whole
@@ -63,8 +64,9 @@ contains
     end do
   contains
 
-    !> Chooses the number of slabs and the number of domains in each slab. The choice minimises the estimated work, under two
-    !> conditions: the total number of domains is not much smaller than `wanted`, and no domain is too narrow.
+    !> Chooses the number of slabs and the number of domains in each slab. The estimated work is
+    !> minimised, provided that the total number of domains is not much smaller than `wanted`, and
+    !> that no domain is too narrow.
     pure function numbers() result(n)
       integer(int32) :: n(2), most(2), columns, rows
 
@@ -77,8 +79,8 @@ contains
       end do
     end function numbers
 
-    !> Estimated work of one thread, if all domains had equal sizes: the number of domains per thread times the number of cells in
-    !> the largest patch.
+    !> Estimated work of one thread with domains of equal size: the number of domains per thread
+    !> times the number of cells in the largest extended domain.
     pure function work(n)
       integer(int32), intent(in) :: n(2)
       real(real64) :: work
@@ -88,8 +90,8 @@ contains
     end function work
   end subroutine cut
 
-  !> First cells of the n pieces into which a line of cells is divided; the last element is the number of cells plus 1. The pieces
-  !> have about equal weight and are at least `least` cells long.
+  !> First cells of n pieces of about equal weight into which a line of cells is divided, followed
+  !> by the number of cells plus 1. Each piece has at least `least` cells.
   pure function pieces(weight, n, least) result(first)
     integer(int32), intent(in) :: weight(:), n, least
     integer(int32) :: first(n + 1), k, place
@@ -110,7 +112,7 @@ contains
     end do
   end function pieces
 
-  !> The patch of the k-th domain.
+  !> The extended domain of the k-th domain, as a block of cells.
   pure function patch_of(self, k, periodic) result(patch)
     class(domain_cuts_t), intent(in) :: self
     integer(int32), intent(in) :: k
@@ -129,7 +131,7 @@ contains
     call patch%find_sides(periodic)
   end function patch_of
 
-  !> Indices of the domains that own disks in the patch of the k-th domain.
+  !> Indices of the domains that own disks in the halo of the k-th domain.
   pure function neighbours_of(self, k, patch) result(list)
     class(domain_cuts_t), intent(in) :: self
     integer(int32), intent(in) :: k

@@ -1,8 +1,7 @@
-!> One domain of a simulation that is divided among threads. A domain owns the disks in a rectangle of cells. The domain also
-!> contains copies of the disks in the halo, which consists of the cells around the rectangle of the domain. The rectangle and the
-!> halo form the patch of the domain. Each domain has its own event-driven engine. Disks that would enter the patch during a time
-!> window are missing in the domain. Errors in the motion of copies therefore spread inwards from the edge of the patch during the
-!> window, until `domain_borders` corrects the copies.
+!> One domain of a simulation that is divided among threads, with its own event-driven engine. A domain owns the disks in a
+!> rectangle of cells, and has ghosts (copies) of the disks in the halo around it; rectangle and halo form the extended domain,
+!> `patch`. Disks that would enter it during a time window are missing. Errors in the motion of ghosts therefore spread inwards from
+!> its edge, until `domain_borders` corrects the ghosts after the window.
 module domains
   use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
@@ -17,55 +16,56 @@ module domains
   use system, only: seconds
   implicit none
   private
-  public :: advance_domain, correction_t, domain_t, forever, list_copies, load, merge_logs, next_time, slot_of_copy, write_back
+  public :: advance_domain, correction_t, domain_t, forever, list_ghosts, load, merge_logs, next_time, slot_of_ghost, write_back
 
   real(real64), parameter :: forever = 2.0e150_real64      !! a time later than the time of any event
-  !> Wall-clock time after which a domain gives up a window that it has not completed [s]
+  !> Wall-clock time after which a domain abandons a window that it has not completed [s]
   real(real64), parameter :: longest_window = 5.0_real64
   !> Number of iterations between two checks of signals and of the clock.
   integer(int64), parameter :: iterations_between_checks = 100000
-  !> A domain with n disks has n/spare + spare_at_least vacant slots (array elements without a disk) for disks that enter the patch.
+  !> A domain of n disks has n/spare + spare_at_least vacant slots (array elements without a disk) for disks that enter the extended
+  !> domain.
   integer(int32), parameter :: spare = 32, spare_at_least = 200
 
-  !> The true state of a disk, with which a domain updates a wrong copy of the disk or adds a missing copy. If a disk has left the
-  !> patch, the domain removes its copy of the disk.
+  !> True state of a disk, with which a domain corrects or adds its ghost. If the disk has left the extended domain, the ghost is
+  !> removed.
   type, extends(whole_disk_t) :: correction_t
     integer(int32) :: global_index = 0             !! index of the disk in the whole simulation
-    !> Column and row of the disk relative to the patch of this domain; the disk may be outside the patch.
+    !> Column and row of the disk, counted in the extended domain; the disk may be outside it.
     integer(int32) :: cell(2) = 0
-    integer(int32) :: slot = 0                     !! index of the copy in this domain; 0 if there is no copy
+    integer(int32) :: slot = 0                     !! index of the ghost in this domain; 0 if there is none
   end type correction_t
 
   type :: domain_t
     integer(int32) :: low(2) = 0, high(2) = 0      !! first and last column and row of the domain in the whole grid
     integer(int32) :: halo = 0                     !! width of the halo in cells
-    integer(int32), allocatable :: neighbour(:)    !! indices of the domains that own disks in the patch of this domain
+    integer(int32), allocatable :: neighbour(:)    !! indices of the domains that own disks in this extended domain
     type(patch_t) :: patch
-    !> The disks that the domain owns, and copies of other disks. Some array elements (slots) are vacant. The time origin equals the
-    !> time origin of the whole simulation.
+    !> Owned disks and ghosts, with some vacant array elements (slots). The time origin is that of
+    !> the whole simulation.
     type(simulation_t) :: sim
     type(event_driven_t) :: engine
-    !> (slots) Index of each disk in the whole simulation. The elements of `global_index` at vacant slots form a linked list of the
-    !> vacant slots.
+    !> (slots) Index of each disk in the whole simulation. The elements at vacant slots form a
+    !> linked list of these slots.
     integer(int32), allocatable :: global_index(:)
     integer(int32) :: vacant = 0                   !! index of the first vacant slot; 0 if no slot is vacant
     type(event_log_t), allocatable :: log          !! log of the collisions that this domain counts
     integer(int64) :: iterations = 0               !! number of iterations of the engine in the present window
     logical :: done = .false.                      !! whether the engine has reached the end of the window
-    logical :: valid = .false.                     !! whether no disk that the domain owns can have touched a wrong copy
+    logical :: valid = .false.                     !! whether no owned disk can have touched a wrong ghost
     integer(int32) :: n_corrections = 0
     type(correction_t), allocatable :: corrections(:)  !! (at least n_corrections) corrections to be applied
-    integer(int32), allocatable, private :: key(:), slot(:)  !! (0:last_key) hash table of the ids and slots of the copies
+    integer(int32), allocatable, private :: key(:), slot(:)  !! (0:last_key) hash table of the ids and slots of the ghosts
     integer(int32), private :: last_key = 0        !! largest index of the hash table: a power of two minus 1
   end type domain_t
 
 contains
 
-  !> Loads the disks that are in the patch of the domain, and predicts their events.
+  !> Loads the disks in the extended domain, and predicts their events.
   subroutine load(self, sim, disks)
     type(domain_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: disks(:)         !! indices of the disks in the patch
+    integer(int32), intent(in) :: disks(:)         !! indices of the disks in the extended domain
     integer(int32) :: i, n, slots
 
     n = size(disks, kind=int32)
@@ -91,7 +91,7 @@ contains
     call start()
   contains
 
-    !> Allocates slots for n disks, and further slots that are vacant at first.
+    !> Allocates slots for n disks, and further vacant ones.
     subroutine make_room()
       integer(int32) :: slots
 
@@ -142,19 +142,19 @@ contains
           call histories%begin_history(self%sim%tag(k)%cell, k)
         end do
       end associate
-      call list_copies(self)
+      call list_ghosts(self)
     end subroutine start
   end subroutine load
 
-  !> Builds the hash table that finds copies by their ids.
-  subroutine list_copies(self)
+  !> Builds the hash table that finds ghosts by their ids.
+  subroutine list_ghosts(self)
     type(domain_t), intent(inout) :: self
-    integer(int32) :: k, place, copies
+    integer(int32) :: k, place, ghosts
 
-    copies = self%engine%histories%n_copies()
-    if (.not. allocated(self%key) .or. 3*copies > 2*self%last_key) then
+    ghosts = self%engine%histories%n_ghosts()
+    if (.not. allocated(self%key) .or. 3*ghosts > 2*self%last_key) then
       self%last_key = 255
-      do while (self%last_key < 2*copies)
+      do while (self%last_key < 2*ghosts)
         self%last_key = 2*self%last_key + 1
       end do
       if (allocated(self%key)) deallocate (self%key, self%slot)
@@ -169,9 +169,9 @@ contains
         self%slot(place) = history%slot
       end associate
     end do
-  end subroutine list_copies
+  end subroutine list_ghosts
 
-  !> Position of an id in the hash table, or the free position where the id would be stored.
+  !> Position of an id in the hash table, or the free position where it would be stored.
   pure function place_of(self, id) result(place)
     type(domain_t), intent(in) :: self
     integer(int32), intent(in) :: id
@@ -183,8 +183,8 @@ contains
     end do
   end function place_of
 
-  !> The slot of the copy with the given id; 0 if the domain has no such copy.
-  pure function slot_of_copy(self, id) result(slot)
+  !> Slot of the ghost with the given id; 0 if the domain has none.
+  pure function slot_of_ghost(self, id) result(slot)
     type(domain_t), intent(in) :: self
     integer(int32), intent(in) :: id
     integer(int32) :: slot, place
@@ -192,10 +192,10 @@ contains
     place = place_of(self, id)
     slot = 0
     if (self%key(place) == id) slot = self%slot(place)
-  end function slot_of_copy
+  end function slot_of_ghost
 
-  !> Advances the domain with its copies to the end of a window. The domain gives up the window after the given number of iterations
-  !> of the engine, or after `longest_window`.
+  !> Advances the domain with its ghosts to the end of a window. The window is abandoned once the
+  !> engine has done the given number of iterations or has run for `longest_window`.
   subroutine advance_domain(self, t_end, iterations)
     type(domain_t), intent(inout) :: self
     real(real64), intent(in) :: t_end              !! end of the window, relative to the time origin `box%epoch` [time]
@@ -206,7 +206,7 @@ contains
     integer(int64) :: iterations_left
 
     self%done = .false.
-    if (.not. self%valid) return                   ! without enough slots for all copies, the window is invalid
+    if (.not. self%valid) return                   ! without enough slots for all ghosts, the window is invalid
     began = seconds()
     limits%time = t_end
     iterations_left = iterations
@@ -233,7 +233,7 @@ contains
     t = self%sim%disk(i)%event_time
   end function next_time
 
-  !> Copies the states of the disks that the domain owns to the whole simulation.
+  !> Copies the states of the owned disks to the whole simulation.
   subroutine write_back(self, sim)
     type(domain_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
@@ -245,8 +245,8 @@ contains
     end do
   end subroutine write_back
 
-  !> Moves the log entries of all domains to the log of the whole simulation, sorted by time. The order of simultaneous collisions
-  !> in different domains is unknown. If the logs of different domains contain simultaneous collisions, `good` becomes .false.
+  !> Merges the log entries of all domains, sorted by time, into the log of the whole simulation. `good` is set to .false. if
+  !> collisions in different domains are simultaneous, because their order is unknown.
   subroutine merge_logs(domain, log, good)
     type(domain_t), intent(inout) :: domain(:)
     type(event_log_t), intent(inout) :: log

@@ -1,8 +1,8 @@
-!> Parallel event-driven dynamics, which uses several cores, or one core with domains that fit into the cache. The results are
-!> bit-identical to the results of the serial engine. The box is divided into domains, each of which has its own engine. The domains
-!> advance by time windows, and the domains are compared after each window (see `partition` and `domains`). If a window is invalid,
-!> the simulation returns to its state before the present series of windows. The serial engine is used for small or inactive
-!> systems, for a stop within simultaneous collisions, and in an inelastic collapse.
+!> Parallel event-driven dynamics, on several cores, or on one core with domains that fit into its cache. The results are
+!> bit-identical to those of the serial engine. The box is divided into domains with an engine each, which advance independently
+!> through one time window and are then compared (see `partition` and `domains`). If a window is invalid, the simulation returns to
+!> its state before the present series of windows. The serial engine takes over for small or inactive systems, for a stop between
+!> simultaneous collisions, and in an inelastic collapse.
 module parallel_events
   use kinds, only: int32, int64, real64
   use domains, only: merge_logs
@@ -19,11 +19,11 @@ module parallel_events
 
   integer, parameter :: most_windows = 24                      !! largest number of windows in one call of `run_domains`
   real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the usual length
-  !> Domains are used only if enough events per disk remain before a limit is reached. The required number of events per disk is
-  !> `least_left` if domains are already in use, and `least_left_to_begin` otherwise.
+  !> Smallest number of events per disk, left before the next limit, for which domains are worth while: `least_left` if they are
+  !> already in use, `least_left_to_begin` otherwise.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
-  !> Shortest and longest period of the serial engine if domains cannot be used, if a limit or an inelastic collapse is reached, or
-  !> if no event is left [events per disk]
+  !> Shortest and longest period of the serial engine when domains cannot be used, a limit or an inelastic collapse has been
+  !> reached, or no event is left [events per disk]
   integer(int64), parameter :: brief(2) = 5
   !> Shortest and longest period of the serial engine after invalid windows [events per disk]
   integer(int64), parameter :: after_failures(2) = [5, 5*2**20]
@@ -37,8 +37,8 @@ module parallel_events
     !> Template of the serial engine, which is copied when the serial engine is needed.
     type(event_driven_t) :: serial
     type(partition_t) :: parts
-    !> Smallest number of disks in a domain. In a periodic box, in which domains have neighbouring domains on all sides, the
-    !> smallest number is twice as large.
+    !> Smallest number of disks in a domain; twice as many in a periodic box, in which domains have
+    !> neighbours on all sides.
     integer(int32) :: least_disks = 1250
     integer(int32) :: most_disks = 62000           !! largest number of disks in a domain that fits into the cache
     !> Average number of active cores below which the serial engine is faster than several threads.
@@ -58,7 +58,7 @@ module parallel_events
 
 contains
 
-  !> Prepares a run. The procedure predicts no events, because the engine that will execute the events is not known yet.
+  !> Prepares a run without predicting events, because the engine that will execute them is still unknown.
   subroutine start(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -75,8 +75,8 @@ contains
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
 
-  !> Updates the predicted events after disks have been changed. The serial engine predicts the events of the changed disks again.
-  !> Domains cannot update their predicted events and are loaded again.
+  !> Updates the predicted events after changes of disks. The serial engine predicts the events of these disks anew; domains cannot,
+  !> and are loaded again.
   subroutine renew(self, sim, changed)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -90,8 +90,7 @@ contains
     end if
   end subroutine renew
 
-  !> Largest number of domains for which the work on copies of disks is worthwhile. The result is also the largest number of threads
-  !> that can be used.
+  !> Largest number of domains, and therefore of threads, for which the work on ghosts pays off.
   pure function most_domains(self, n_disks, periodic) result(n)
     class(parallel_events_t), intent(in) :: self
     integer(int32), intent(in) :: n_disks
@@ -112,138 +111,159 @@ contains
 
     self%arrived = .false.
     if (limits%reached(sim%tally) .or. is_full(log)) return
-    serially = .not. domains_pay()
-    if (.not. serially) call run_domains()
-    if (serially) call advance_serially()
+    serially = .not. domains_pay(self, sim, limits)
+    if (.not. serially) then
+      call run_domains(self, sim, limits, log)
+      serially = sim%tally%events < self%serial_until        ! `run_domains` has selected the serial engine
+    end if
+    if (serially) call advance_serially(self, sim, limits, error, log)
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain) .and. &
       (sim%now >= sim%epoch_end .or. sim%tally%events >= most_events(sim))) then
       deallocate (self%parts%domain)               ! the memory of the domains is needed to sort the disks
       self%predicted_by = no_engine
     end if
-  contains
-
-    !> Whether several domains can be faster than the serial engine.
-    pure function domains_pay() result(yes)
-      logical :: yes
-      real(real64) :: least
-
-      least = merge(least_left, least_left_to_begin, self%predicted_by == all_domains)*sim%n_disks()
-      yes = self%parts%wanted > 1 .and. sim%tally%events >= self%serial_until .and. limits%events - sim%tally%events > least &
-        .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
-    end function domains_pay
-
-    !> Advances the domains by several windows. If any window is invalid, the simulation keeps its state before the call, and the
-    !> next call tries shorter windows.
-    subroutine run_domains()
-      real(real64) :: t
-      integer :: windows, listed
-      logical :: good, too_far
-
-      listed = 0
-      if (self%predicted_by /= all_domains) then
-        if (allocated(self%engine)) deallocate (self%engine)
-        self%predicted_by = no_engine
-        call self%parts%fill(sim, present(log), good)
-        if (.not. good) call use_serial_engine(brief)
-        if (.not. good) return
-        self%predicted_by = all_domains
-      end if
-      call self%parts%run_windows(sim, limits, most_windows_now(), t, windows, good)
-      self%windows_done = self%windows_done + windows
-      if (present(log)) then
-        listed = log%n
-        if (good) call merge_logs(self%parts%domain, log, good)
-      end if
-      ! The serial engine, unlike the domains, finds the exact event at which a limit is reached, and examines collisions that can
-      ! be part of a collapse.
-      too_far = good
-      if (good) too_far = limits%outgrown(self%parts%total_tally(sim)) .or. t - sim%last_advance < sim%negligible_time &
-        .or. any(self%parts%domain%sim%tally%unexamined > 0)
-      if (good .and. .not. too_far) then
-        call self%parts%write_back_all(sim, t)
-        self%arrived = t >= limits%time
-      else
-        self%predicted_by = no_engine
-        if (present(log)) log%n = listed
-      end if
-      if (.not. good) call shorten_windows()
-      if (good) call lengthen_windows(windows)
-      if (too_far) call use_serial_engine(brief)
-      if (self%predicted_by == no_engine) return
-      if (self%parts%threads > 1 .and. self%parts%cores <= self%least_cores) then
-        call use_serial_engine(while_busy)
-        self%parts%cores = self%parts%threads
-      end if
-      ! The serial engine determines whether any further event will occur.
-      if (all(self%parts%domain%engine%idle)) call use_serial_engine(brief)
-    end subroutine run_domains
-
-    !> Largest number of windows in the next call of `run_domains`. After invalid windows the number of windows per call is reduced,
-    !> because a single invalid window invalidates all windows of a call.
-    pure function most_windows_now() result(n)
-      integer :: n
-
-      n = max(1, int(most_windows*self%parts%shortening**4))
-    end function most_windows_now
-
-    !> Makes windows longer after a call in which all windows were valid. The length of windows is constant within a call of
-    !> `run_domains`. If windows became longer during a call, the last window of every call could be invalid. The run would make no
-    !> progress, because an invalid window invalidates all windows of a call.
-    subroutine lengthen_windows(windows)
-      integer, intent(in) :: windows               !! number of windows in the last call
-
-      associate (shortening => self%parts%shortening)
-        shortening = min(1.0_real64, 1.1_real64**windows*shortening)
-      end associate
-    end subroutine lengthen_windows
-
-    !> Makes windows shorter after an invalid window, or selects the serial engine for a period if windows already have the shortest
-    !> length.
-    subroutine shorten_windows()
-      self%windows_failed = self%windows_failed + 1
-      associate (shortening => self%parts%shortening)
-        shortening = 0.5_real64*shortening
-        if (shortening > shortest) return
-        shortening = shortest
-      end associate
-      call use_serial_engine(after_failures)
-    end subroutine shorten_windows
-
-    !> Selects the serial engine for a period. A period of the serial engine is twice as long as the previous period, unless the
-    !> domains have executed more events since the previous period than the serial engine in that period. Because the length of the
-    !> periods doubles, a run that is unsuitable for domains takes hardly longer than with the serial engine alone.
-    subroutine use_serial_engine(periods)
-      integer(int64), intent(in) :: periods(2)      !! shortest and longest period [events per disk]
-
-      if (sim%tally%events - self%serial_until > self%serial_period*sim%n_disks()) self%serial_period = 0
-      self%serial_period = min(max(2*self%serial_period, periods(1)), periods(2))
-      self%serial_until = sim%tally%events + self%serial_period*sim%n_disks()
-      serially = .true.
-    end subroutine use_serial_engine
-
-    !> Advances the simulation with the serial engine, at most to the end of the period for which the serial engine was selected.
-    subroutine advance_serially()
-      type(limits_t) :: goal
-      integer(int64) :: events
-      real(real64) :: time
-
-      if (allocated(self%parts%domain)) deallocate (self%parts%domain)
-      if (.not. allocated(self%engine)) allocate (self%engine, source=self%serial)
-      if (self%predicted_by /= serial_engine) call self%engine%start(sim)
-      self%predicted_by = serial_engine
-      goal = limits
-      if (sim%tally%events < self%serial_until) goal%events = min(limits%events, self%serial_until)
-      events = sim%tally%events
-      time = sim%time()
-      call self%engine%advance(sim, goal, error, log)
-      self%serial_events = self%serial_events + sim%tally%events - events
-      self%idle = self%engine%idle
-      self%arrived = self%engine%arrived
-      self%last_event = self%engine%last_event
-      self%iterations_left = self%engine%iterations_left
-      if (sim%tally%events - events >= sim%n_disks()) &
-        call self%parts%update_rates(sim%tally%events - events, goal%iterations - self%iterations_left, sim%time() - time)
-    end subroutine advance_serially
   end subroutine advance
+
+  !> Whether several domains can be faster than the serial engine.
+  pure function domains_pay(self, sim, limits) result(yes)
+    class(parallel_events_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: limits
+    logical :: yes
+    real(real64) :: least
+
+    least = merge(least_left, least_left_to_begin, self%predicted_by == all_domains)*sim%n_disks()
+    yes = self%parts%wanted > 1 .and. sim%tally%events >= self%serial_until .and. limits%events - sim%tally%events > least &
+      .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
+  end function domains_pay
+
+  !> Advances the domains by several windows. If any window is invalid, the simulation keeps the state before the call, and the
+  !> next call tries shorter windows.
+  subroutine run_domains(self, sim, limits, log)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    type(limits_t), intent(in) :: limits
+    type(event_log_t), intent(inout), optional :: log
+    real(real64) :: t
+    integer :: windows, listed
+    logical :: good, too_far
+
+    listed = 0
+    if (self%predicted_by /= all_domains) then
+      if (allocated(self%engine)) deallocate (self%engine)
+      self%predicted_by = no_engine
+      call self%parts%fill(sim, present(log), good)
+      if (.not. good) call use_serial_engine(self, sim, brief)
+      if (.not. good) return
+      self%predicted_by = all_domains
+    end if
+    call self%parts%run_windows(sim, limits, most_windows_now(self), t, windows, good)
+    self%windows_done = self%windows_done + windows
+    if (present(log)) then
+      listed = log%n
+      if (good) call merge_logs(self%parts%domain, log, good)
+    end if
+    ! Only the serial engine finds the exact event at which a limit is reached, and examines
+    ! collisions that can be part of a collapse.
+    too_far = good
+    if (good) too_far = limits%outgrown(self%parts%total_tally(sim)) .or. t - sim%last_advance < sim%negligible_time &
+      .or. any(self%parts%domain%sim%tally%unexamined > 0)
+    if (good .and. .not. too_far) then
+      call self%parts%write_back_all(sim, t)
+      self%arrived = t >= limits%time
+    else
+      self%predicted_by = no_engine
+      if (present(log)) log%n = listed
+    end if
+    if (.not. good) call shorten_windows(self, sim)
+    if (good) call lengthen_windows(self, windows)
+    if (too_far) call use_serial_engine(self, sim, brief)
+    if (self%predicted_by == no_engine) return
+    if (self%parts%threads > 1 .and. self%parts%cores <= self%least_cores) then
+      call use_serial_engine(self, sim, while_busy)
+      self%parts%cores = self%parts%threads
+    end if
+    ! The serial engine determines whether any further event will occur.
+    if (all(self%parts%domain%engine%idle)) call use_serial_engine(self, sim, brief)
+  end subroutine run_domains
+
+  !> Largest number of windows in the next call of `run_domains`. It is reduced after invalid
+  !> windows, because a single invalid window invalidates all windows of a call.
+  pure function most_windows_now(self) result(n)
+    class(parallel_events_t), intent(in) :: self
+    integer :: n
+
+    n = max(1, int(most_windows*self%parts%shortening**4))
+  end function most_windows_now
+
+  !> Lengthens the windows after a call in which all were valid. Within a call their length is constant: if it grew, the last
+  !> window could be invalid in every call, and the run would make no progress, because an invalid window invalidates all windows
+  !> of its call.
+  pure subroutine lengthen_windows(self, windows)
+    class(parallel_events_t), intent(inout) :: self
+    integer, intent(in) :: windows               !! number of windows in the last call
+
+    associate (shortening => self%parts%shortening)
+      shortening = min(1.0_real64, 1.1_real64**windows*shortening)
+    end associate
+  end subroutine lengthen_windows
+
+  !> Shortens the windows after an invalid one or, if they are already as short as possible, selects the serial engine for a
+  !> period.
+  subroutine shorten_windows(self, sim)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+
+    self%windows_failed = self%windows_failed + 1
+    associate (shortening => self%parts%shortening)
+      shortening = 0.5_real64*shortening
+      if (shortening > shortest) return
+      shortening = shortest
+    end associate
+    call use_serial_engine(self, sim, after_failures)
+  end subroutine shorten_windows
+
+  !> Selects the serial engine for a period twice as long as the previous one, unless the domains have since executed more events
+  !> than the serial engine did in that period. Owing to this doubling, a run unsuitable for domains takes hardly longer than with
+  !> the serial engine alone.
+  subroutine use_serial_engine(self, sim, periods)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int64), intent(in) :: periods(2)      !! shortest and longest period [events per disk]
+
+    if (sim%tally%events - self%serial_until > self%serial_period*sim%n_disks()) self%serial_period = 0
+    self%serial_period = min(max(2*self%serial_period, periods(1)), periods(2))
+    self%serial_until = sim%tally%events + self%serial_period*sim%n_disks()
+  end subroutine use_serial_engine
+
+  !> Advances the simulation with the serial engine, at most to the end of the period for which it
+  !> was selected.
+  subroutine advance_serially(self, sim, limits, error, log)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    type(limits_t), intent(in) :: limits
+    type(error_t), allocatable, intent(out) :: error
+    type(event_log_t), intent(inout), optional :: log
+    type(limits_t) :: goal
+    integer(int64) :: events
+    real(real64) :: time
+
+    if (allocated(self%parts%domain)) deallocate (self%parts%domain)
+    if (.not. allocated(self%engine)) allocate (self%engine, source=self%serial)
+    if (self%predicted_by /= serial_engine) call self%engine%start(sim)
+    self%predicted_by = serial_engine
+    goal = limits
+    if (sim%tally%events < self%serial_until) goal%events = min(limits%events, self%serial_until)
+    events = sim%tally%events
+    time = sim%time()
+    call self%engine%advance(sim, goal, error, log)
+    self%serial_events = self%serial_events + sim%tally%events - events
+    self%idle = self%engine%idle
+    self%arrived = self%engine%arrived
+    self%last_event = self%engine%last_event
+    self%iterations_left = self%engine%iterations_left
+    if (sim%tally%events - events >= sim%n_disks()) &
+      call self%parts%update_rates(sim%tally%events - events, goal%iterations - self%iterations_left, sim%time() - time)
+  end subroutine advance_serially
 
 end module parallel_events

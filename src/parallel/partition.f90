@@ -1,11 +1,12 @@
-!> A simulation that is divided into domains, which advance together by time windows. Each domain predicts and stores the events of
-!> the disks in its patch. The object `sim` of the whole simulation does not change until the states of the disks are copied back
-!> from the domains. After an invalid window the states in the domains are wrong, and the domains have to be loaded again.
+!> A simulation divided into domains, which advance together by time windows. Each domain predicts
+!> and stores the events of the disks in its extended domain. The state of the whole simulation,
+!> `sim`, does not change until the states are copied back from the domains. After an invalid
+!> window, the domains hold wrong states and must be loaded again.
 module partition
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
   use cell_layout, only: whole_box
-  use domain_borders, only: compare_copies, correct_copies
+  use domain_borders, only: compare_ghosts, correct_ghosts
   use domain_cuts, only: domain_cuts_t
   use domains, only: advance_domain, domain_t, load, next_time, write_back
   use evolution, only: limits_t
@@ -21,10 +22,10 @@ module partition
   !> Wall-clock time after which `run_windows` returns, so that the caller can check signals [s]
   real(real64), parameter :: longest_call = 1.0_real64
   real(real64), parameter :: averaging_time = 0.1_real64       !! averaging time for the number of active cores [s]
-  !> If fewer than `few_events` events remain before a limit is reached, the domains advance one event at a time.
+  !> Number of events before a limit below which the domains advance one event at a time.
   real(real64), parameter :: few_events = 20.0_real64
 
-  !> The next step of all threads, which one thread determines while the other threads wait.
+  !> The next step of all threads, determined by one thread while the others wait.
   type :: plan_t
     logical :: continues = .true.
     integer :: windows = 0                         !! number of windows started
@@ -43,14 +44,15 @@ module partition
     integer(int32) :: wanted = 1                   !! number of domains
     real(real64) :: window = 0.5_real64            !! length of a window [collisions per disk]
     integer(int32) :: halo = 6                     !! width of the halo around a domain [cells]
-    !> Largest number of iterations of one engine in a step, divided by the number of iterations expected in all domains together.
+    !> Largest number of iterations of one engine in a step, relative to the number expected in all
+    !> domains together.
     real(real64) :: overload = 4.0_real64
-    type(patch_t) :: whole                         !! patch of all cells of the box; the cells do not change during a run
+    type(patch_t) :: whole                         !! block of all cells of the box, which do not change during a run
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
     real(real64) :: event_rate = 0.0_real64        !! number of events per unit of time; 0 if not known yet [1/time]
     real(real64) :: iterations_per_event = 10.0_real64  !! number of iterations of an engine per event
-    real(real64) :: shortening = 1.0_real64        !! factor by which invalid windows have shortened later windows
+    real(real64) :: shortening = 1.0_real64        !! factor by which invalid windows have shortened later ones
     integer(int32) :: widening = 0                 !! increase of the width of the halo after invalid windows [cells]
     real(real64) :: cores = 0.0_real64             !! recent average of the number of active cores; 0 if not known yet
   contains
@@ -63,7 +65,8 @@ module partition
 
 contains
 
-  !> Divides a simulation and loads the domains. `cut` is .false. if the simulation cannot be divided into at least two domains.
+  !> Divides a simulation and loads the domains. `cut` is .false. if this does not yield at least
+  !> two domains.
   subroutine fill(self, sim, listing, cut)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -103,8 +106,8 @@ contains
     !$omp end parallel do
   end subroutine fill
 
-  !> Updates the measured event rate and the measured number of iterations per event. The event rate determines the length of
-  !> windows. The product of the two values determines the limit of iterations.
+  !> Updates the measured event rate, which determines the length of windows, and the measured
+  !> number of iterations per event. Their product determines the limit of iterations.
   pure subroutine update_rates(self, events, iterations, time)
     class(partition_t), intent(inout) :: self
     integer(int64), intent(in) :: events, iterations
@@ -115,7 +118,8 @@ contains
     self%iterations_per_event = max(iterations/real(events, real64), 1.0_real64)
   end subroutine update_rates
 
-  !> Counters and sums of the whole simulation, including the collisions in the domains since the domains were loaded.
+  !> Counters and sums of the whole simulation, including the collisions in the domains since they
+  !> were loaded.
   pure function total_tally(self, sim) result(so_far)
     class(partition_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -128,11 +132,13 @@ contains
     end do
   end function total_tally
 
-  !> Executes successive windows in all domains, until a window is invalid, a limit is reached, or `longest_call` has passed. A
-  !> window ends early when the number of events or collisions reaches its limit. `good` is .true. if all windows are valid.
+  !> Executes successive windows in all domains, until a window is invalid, a limit is reached, or
+  !> `longest_call` has passed. A window ends early if the number of events or collisions reaches
+  !> its limit. `good` is .true. if all windows are valid.
   !>
-  !> The threads wait for each other twice in each window: all domains must have ended the window before they are compared, and all
-  !> comparisons must be complete before any state is changed.
+  !> The threads wait for each other twice per window: all domains must have reached the end of the
+  !> window before they are compared, and all comparisons must be complete before any state is
+  !> changed.
   subroutine run_windows(self, sim, limits, most, t, windows, good)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -150,7 +156,7 @@ contains
     call cpu_time(cpu(1))
     plan%until = began + longest_call
     plan%t = sim%now
-    call begin_window()
+    call begin_window(self, sim, limits, plan)
     call open_barrier(barrier)
     !$omp parallel num_threads(self%threads) private(k)
     call join(barrier)
@@ -158,26 +164,27 @@ contains
     do while (plan%continues)
       !$omp do schedule(static, 1)
       do k = 1, self%cuts%n
-        if (plan%corrects) call correct_copies(self%domain(k))
+        if (plan%corrects) call correct_ghosts(self%domain(k))
         call advance_domain(self%domain(k), plan%t, plan%iterations)
       end do
       !$omp end do nowait
       if (is_last_at(barrier)) then
         plan%corrects = .false.
         plan%compares = stop_requested()
-        if (.not. plan%compares) plan%compares = .not. (all(self%domain%done) .and. plan%t < plan%t_end .and. events_left() > 0)
-        if (.not. plan%compares) call choose_target()
+        if (.not. plan%compares) plan%compares = .not. (all(self%domain%done) .and. plan%t < plan%t_end &
+          .and. events_left(self, sim, limits) > 0)
+        if (.not. plan%compares) call choose_target(self, sim, limits, plan)
         call release(barrier)
       end if
       !$omp flush
       if (.not. plan%compares) cycle
       !$omp do schedule(static, 1)
       do k = 1, self%cuts%n
-        call compare_copies(self%domain, k)
+        call compare_ghosts(self%domain, k)
       end do
       !$omp end do nowait
       if (is_last_at(barrier)) then
-        call end_window()
+        call end_window(self, sim, limits, most, plan)
         call release(barrier)
       end if
       !$omp flush
@@ -190,74 +197,96 @@ contains
     t = plan%t
     windows = plan%windows
     good = plan%valid
-  contains
-
-    !> Sets up the next window.
-    subroutine begin_window()
-      real(real64) :: length
-
-      length = self%window*self%shortening*sim%n_disks()/(2*self%event_rate)
-      ! With more domains than threads, each domain has to be loaded into the cache once per window; longer windows save such loads.
-      if (self%wanted > self%threads) length = 2*length
-      plan%windows = plan%windows + 1
-      plan%t_begin = plan%t
-      plan%t_end = plan%t + length
-      if (plan%t_end + 0.5_real64*length > limits%time) plan%t_end = limits%time
-      plan%events = sum(self%domain%sim%tally%events)
-      plan%corrects = .true.
-      self%domain%iterations = 0
-      call choose_target()
-    end subroutine begin_window
-
-    !> Chooses the time up to which all domains advance next. The chosen time is the end of the window, unless the number of events
-    !> or collisions would exceed its limit in the window. If a limit is near, the domains first advance through most of the
-    !> remaining events, and finally one event at a time. The limit of iterations bounds the work of each engine if the estimated
-    !> event rate is wrong.
-    subroutine choose_target()
-      real(real64) :: expected, sure, next
-      integer(int32) :: k
-
-      expected = 1.2_real64*(plan%t_end - plan%t)*self%event_rate + 100  ! overestimated
-      plan%iterations = int(min(self%overload*self%iterations_per_event*expected, 1.0e15_real64), int64)
-      sure = events_left()
-      next = plan%t_end
-      if (sure <= expected) then
-        sure = 0.9_real64*sure - 5*sqrt(sure)
-        if (sure >= few_events) then
-          next = plan%t + sure/self%event_rate
-        else
-          do k = 1, self%cuts%n
-            next = min(next, next_time(self%domain(k)))
-          end do
-        end if
-      end if
-      plan%t = min(next, plan%t_end)
-    end subroutine choose_target
-
-    !> Determines after the comparison whether the window is valid, and whether another window is started.
-    subroutine end_window()
-      ! A negative value of events_left() means that simultaneous events have exceeded the limit of events or collisions.
-      plan%valid = all(self%domain%done) .and. all(self%domain%valid) .and. events_left() >= 0
-      if (plan%valid) then
-        call self%update_rates(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%iterations), plan%t - plan%t_begin)
-      else
-        self%widening = min(self%widening + 2, self%halo)
-      end if
-      plan%continues = seconds() < plan%until
-      if (plan%continues) plan%continues = plan%valid .and. plan%windows < most .and. plan%t < limits%time .and. events_left() > 0
-      if (plan%continues) call begin_window()
-    end subroutine end_window
-
-    !> Number of events that can be executed before the number of events or the number of collisions reaches its limit.
-    pure function events_left() result(events)
-      real(real64) :: events
-
-      events = min(real(limits%events - sim%tally%events - sum(self%domain%sim%tally%events), real64), &
-        real(limits%collisions - sim%tally%collisions - sum(self%domain%sim%tally%collisions), real64))
-    end function events_left
   end subroutine run_windows
 
-  !> Copies the present states of the domains to the whole simulation. The domains remain loaded and can advance further.
+  !> Sets up the next window.
+  subroutine begin_window(self, sim, limits, plan)
+    class(partition_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: limits
+    type(plan_t), intent(inout) :: plan
+    real(real64) :: length
+
+    length = self%window*self%shortening*sim%n_disks()/(2*self%event_rate)
+    ! If there are more domains than threads, each domain is loaded into the cache once per
+    ! window; longer windows need fewer such loads.
+    if (self%wanted > self%threads) length = 2*length
+    plan%windows = plan%windows + 1
+    plan%t_begin = plan%t
+    plan%t_end = plan%t + length
+    if (plan%t_end + 0.5_real64*length > limits%time) plan%t_end = limits%time
+    plan%events = sum(self%domain%sim%tally%events)
+    plan%corrects = .true.
+    self%domain%iterations = 0
+    call choose_target(self, sim, limits, plan)
+  end subroutine begin_window
+
+  !> Chooses the time up to which all domains advance next: the end of the window, unless the
+  !> number of events or collisions would exceed its limit before. Near a limit the domains first
+  !> execute most of the remaining events, and finally single events. The limit of iterations
+  !> bounds the work of each engine in case the estimated event rate is wrong.
+  subroutine choose_target(self, sim, limits, plan)
+    class(partition_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: limits
+    type(plan_t), intent(inout) :: plan
+    real(real64) :: expected, sure, next
+    integer(int32) :: k
+
+    expected = 1.2_real64*(plan%t_end - plan%t)*self%event_rate + 100  ! overestimated
+    plan%iterations = int(min(self%overload*self%iterations_per_event*expected, 1.0e15_real64), int64)
+    sure = events_left(self, sim, limits)
+    next = plan%t_end
+    if (sure <= expected) then
+      sure = 0.9_real64*sure - 5*sqrt(sure)
+      if (sure >= few_events) then
+        next = plan%t + sure/self%event_rate
+      else
+        do k = 1, self%cuts%n
+          next = min(next, next_time(self%domain(k)))
+        end do
+      end if
+    end if
+    plan%t = min(next, plan%t_end)
+  end subroutine choose_target
+
+  !> Determines after the comparison whether the window is valid, and whether another one is
+  !> started.
+  subroutine end_window(self, sim, limits, most, plan)
+    class(partition_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: limits
+    integer, intent(in) :: most                    !! largest number of windows
+    type(plan_t), intent(inout) :: plan
+
+    ! A negative value of `events_left` means that simultaneous events have exceeded the limit of
+    ! events or collisions.
+    plan%valid = all(self%domain%done) .and. all(self%domain%valid) .and. events_left(self, sim, limits) >= 0
+    if (plan%valid) then
+      call self%update_rates(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%iterations), plan%t - plan%t_begin)
+    else
+      self%widening = min(self%widening + 2, self%halo)
+    end if
+    plan%continues = seconds() < plan%until
+    if (plan%continues) plan%continues = plan%valid .and. plan%windows < most .and. plan%t < limits%time &
+      .and. events_left(self, sim, limits) > 0
+    if (plan%continues) call begin_window(self, sim, limits, plan)
+  end subroutine end_window
+
+  !> Number of events that can be executed before the number of events or collisions reaches its
+  !> limit.
+  pure function events_left(self, sim, limits) result(events)
+    class(partition_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: limits
+    real(real64) :: events
+
+    events = min(real(limits%events - sim%tally%events - sum(self%domain%sim%tally%events), real64), &
+      real(limits%collisions - sim%tally%collisions - sum(self%domain%sim%tally%collisions), real64))
+  end function events_left
+
+  !> Copies the present states of the domains to the whole simulation. The domains stay in memory,
+  !> so that the run can be continued.
   subroutine write_back_all(self, sim, now)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -6,7 +6,6 @@ module boundary_collisions
   use collisions, only: tangential_law_t, tangential_impulse, wall_law_t, wall_rebound
   use disks, only: advance_disk
   use partners, only: axis_of, is_side, sense_of
-  use side_motion, only: piston
   use random_stream, only: random_stream_t, thermal_walls
   use simulation_state, only: simulation_t
   use tally, only: dissipated, gain, heat, impulse, work
@@ -14,7 +13,8 @@ module boundary_collisions
   private
   public :: collide_wall
 
-  !> Shortest time between successive contacts of a resting disk with the same surface, in units of the contact duration.
+  !> Shortest time between successive contacts of a resting disk with the same surface, in contact
+  !> durations.
   real(real64), parameter :: shortest_separation = 0.4_real64
 
 contains
@@ -45,7 +45,7 @@ contains
     else
       sim%disk(i)%v = wall_rebound(law, v - normal_velocity, normal, elastic)
       if (any(abs(normal_velocity) > 0)) then
-        ! The rounded velocity of the disk is not less than the velocity of the side, because rounding is monotonic.
+        ! The velocity of the disk after rounding is not below that of the side, because rounding is monotonic.
         sim%disk(i)%v = sim%disk(i)%v + normal_velocity
         if (law%restitution < 1 .and. .not. elastic) call end_bouncing(sim%disk(i)%v, v, normal_velocity, normal)
       end if
@@ -53,14 +53,14 @@ contains
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call separate_from_surface(sim, i, code, normal)
       if (law%tangential%is_rough()) call apply_tangential_impulse_at_wall(sim, i, law%tangential, normal, u, v)
     end if
-    if (sim%box%surface(k)%motion%kind == piston) call move_piston(sim, i, code, normal, v, u, t)
+    if (is_side(code)) call move_piston(sim, i, code, normal, v, u, t)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(i)%last_partner = merge(0, code, is_side(code))
     if (counts) call add_wall_sums(sim, i, k, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
 
-  !> Ends a series of bounces on a moving side when a collision dissipates less than the rounding error. The normal velocity of the
-  !> disk is then set to the velocity of the side. Without this rule, a series of bounces on a moving side could be infinite.
+  !> Ends a sequence of bounces on a moving side, which could otherwise be infinite: once a collision dissipates less than the
+  !> rounding error, the disk takes the normal velocity of the side.
   pure subroutine end_bouncing(v, before, normal_velocity, normal)
     real(real64), intent(inout) :: v(2)          !! velocity of the disk after the collision [length/time]
     !> Velocity of the disk before the collision, and normal velocity of the side [length/time]
@@ -72,10 +72,9 @@ contains
     if (left >= -dot_product(before - normal_velocity, normal)) v = v - left*normal
   end subroutine end_bouncing
 
-  !> Applies the momentum transfer between a disk and a piston. When the procedure is called, the disk has the velocity after a
-  !> rebound from a piston of infinite mass. The procedure reduces the impulse of the rebound to the value for the finite mass of
-  !> the piston. When the procedure returns, u contains the mean of the velocities of the piston before and after the collision,
-  !> from which the work of the piston is calculated.
+  !> Transfers momentum between a disk and a piston. On entry the disk has the velocity after rebounding from a piston of infinite
+  !> mass; its impulse is reduced to that for the actual mass. On return u is the mean of the piston velocities before and after the
+  !> collision, with which the work of the piston is calculated.
   pure subroutine move_piston(sim, i, code, normal, before, u, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -83,17 +82,17 @@ contains
     real(real64), intent(in) :: before(2)        !! velocity of the disk before the collision [length/time]
     real(real64), intent(inout) :: u(2)          !! velocity of the surface [length/time]
     real(real64), intent(in) :: t                !! time relative to the time origin `box%epoch` [time]
-    real(real64) :: mass, v, given
+    real(real64) :: v, given
     integer :: axis
 
-    mass = sim%mass_of(i)
+    if (.not. sim%box%side(1 - code)%is_piston()) return
     axis = axis_of(code)
-    associate (motion => sim%box%surface(1 - code)%motion, side => sim%box%side(1 - code), disk => sim%disk(i))
+    associate (motion => sim%box%side(1 - code)%motion, side => sim%box%side(1 - code)%state, disk => sim%disk(i))
       v = sim%box%side_velocity(1 - code, t)
-      given = dot_product(disk%v - before, normal)*mass/(mass + motion%mass)
+      given = motion%taken_from(dot_product(disk%v - before, normal), sim%mass_of(i))
       disk%v = disk%v - given*normal
-      ! The piston is moved into contact with the disk, by the same formula as in `side_time`. Without the shift of the piston,
-      ! rounding errors would separate the piston from a disk at rest.
+      ! Moves the piston into contact with the disk, by the formula of `side_time`; otherwise rounding errors would separate it from
+      ! a disk at rest.
       side%position = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
         (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
       side%velocity = min(v - given, dot_product(disk%v, normal))  ! rounding errors must not make the piston faster than the disk
@@ -102,9 +101,9 @@ contains
     end associate
   end subroutine move_piston
 
-  !> Draws the velocity of disk i after a collision with a thermal wall, as if the disk came from a gas with the temperature of the
-  !> wall. The normal component v of the velocity has the probability density (m v/kT) exp(-m v**2/2kT). The tangential component of
-  !> the velocity and the angular velocity are Gaussian.
+  !> Draws the velocity of disk i after a collision with a thermal wall, as if the disk came from a gas at the wall's temperature.
+  !> The normal component v has the probability density (m v/kT) exp(-m v**2/2kT); the tangential component and the angular velocity
+  !> are Gaussian.
   pure subroutine draw_thermal_velocity(sim, i, temperature, normal, u)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -122,27 +121,35 @@ contains
     if (sim%features%rotation) sim%extra(i)%spin = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine draw_thermal_velocity
 
-  !> Separates disk i from a surface on which the disk rests. With restitution 0 the normal velocity of the disk vanishes in the
-  !> first collision. The elastic collisions of the TC model would not separate a disk without normal velocity from the surface, and
-  !> infinitely many collisions would occur at the same time. The normal velocity of the disk is therefore set such that the next
-  !> contact with the surface is 0.4 to 0.8 contact durations later.
+  !> Separates disk i from a surface on which it rests. With restitution 0 the first collision stops its normal motion, and the
+  !> elastic collisions of the TC model would follow each other infinitely often at the same time. Its normal velocity is therefore
+  !> chosen such that the next contact with the surface is 0.4 to 0.8 contact durations later.
+  !>
+  !> In a container hardly larger than the disk, no velocity achieves this. If the disk leaves the surface by its elastic collision,
+  !> it keeps that velocity; otherwise it takes, of the velocities tried, the one with the latest contact.
   pure subroutine separate_from_surface(sim, i, code, normal)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
     real(real64), intent(in) :: normal(2)        !! unit vector from the wall to the disk
-    real(real64) :: speed, t
+    real(real64) :: speed, t, latest, before(2), best(2)
     integer(int32) :: partner
 
+    latest = -never
+    before = sim%disk(i)%v
+    best = before
     associate (disk => sim%disk(i), contact_time => sim%law%contact_time)
       speed = epsilon(speed)*disk%radius/contact_time
       do while (speed < disk%radius/contact_time)
         t = never
         if (is_side(code)) t = side_time(sim%box, disk, code)
         if (.not. is_side(code)) call next_obstacle(sim%box, disk, code, [code], t, partner)
-        if (t - disk%clock > shortest_separation*contact_time) exit
+        if (t - disk%clock > shortest_separation*contact_time) return
+        if (t > latest) best = disk%v
+        latest = max(latest, t)
         disk%v = disk%v + speed*normal
         speed = 2*speed
       end do
+      disk%v = merge(before, best, dot_product(before, normal) > 0.001_real64*norm2(before))
     end associate
   end subroutine separate_from_surface
 
@@ -165,10 +172,8 @@ contains
     end associate
   end subroutine apply_tangential_impulse_at_wall
 
-  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk consists of the work of the
-  !> moving surface, and of transferred heat or dissipated energy. At a thermal wall, the energy change of the disk minus the work
-  !> of the surface is the transferred heat. At any other wall, the work of the surface minus the energy change of the disk is the
-  !> dissipated energy.
+  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk minus the work of the surface
+  !> is the heat transferred by a thermal wall; with the opposite sign, it is the energy dissipated at any other wall.
   pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

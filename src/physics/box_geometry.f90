@@ -1,30 +1,30 @@
-!> The box that contains the disks: four sides (walls or periodic boundaries), fixed obstacles, and gravity. The contact time of a
-!> disk with the box is a pure function of the state of the disk. Contact times and the clocks of disks are relative to the time
-!> origin `box%epoch`.
+!> The box: four sides (walls or periodic boundaries), fixed obstacles, and gravity. The time at
+!> which a disk touches part of the box depends only on the state of that disk. All times, including
+!> the clocks of disks, are relative to the time origin `box%epoch`.
 module box_geometry
+  use box_side, only: side_t
   use collisions, only: wall_law_t
   use disks, only: disk_t
   use images, only: images_t, moving_images
   use kinds, only: int32, never, real64
   use partners, only: axis_of, is_side, n_sides, obstacle_number, sense_of, side_name
   use shapes, only: shape_t, spare
-  use side_motion, only: piston, side_motion_t, side_state_t, still
   implicit none
   private
   public :: box_t, surface_t
   public :: find_image_contact, free_area, next_obstacle, normal_surface_velocity, obstacle_gap, stays_clear
   public :: tangential_surface_velocity, wall_normal
 
-  !> A side of the box, or a group of obstacles. All obstacles of a group share one contact law and one set of sums over collisions.
+  !> A side of the box, or a group of obstacles that share one contact law and one set of sums over
+  !> collisions.
   type :: surface_t
     character(len=:), allocatable :: name
     type(wall_law_t) :: law
-    type(side_motion_t) :: motion               !! prescribed motion of a side, or motion of a piston
   end type surface_t
 
   type :: obstacle_t
     class(shape_t), allocatable :: shape
-    integer(int32) :: surface = 0               !! index of the surface that represents the group of the obstacle
+    integer(int32) :: surface = 0               !! index of the surface that represents the obstacle's group
   end type obstacle_t
 
   type :: box_t
@@ -33,13 +33,13 @@ module box_geometry
     logical :: periodic(2) = .false.            !! periodic boundary along each axis
     real(real64) :: gravity(2) = 0.0_real64     !! [length/time**2]
     real(real64) :: shear_rate = 0.0_real64     !! shear rate of a box with Lees-Edwards boundary conditions [1/time]
-    !> The sides in the order left, right, bottom, top, followed by the groups of obstacles. Elements that belong to periodic sides
-    !> are not used.
+    !> The sides (left, right, bottom, top), followed by the groups of obstacles. Elements of
+    !> periodic sides are unused.
     type(surface_t), allocatable :: surface(:)
-    type(obstacle_t), allocatable :: obstacle(:)   !! the obstacles of one group have consecutive indices
-    ! State of the box that changes during a run. The input determines the initial state of the sides.
+    logical, dimension(n_sides) :: open = .false.  !! whether disks leave the box through each side
+    type(obstacle_t), allocatable :: obstacle(:)   !! the obstacles of a group have consecutive indices
+    type(side_t) :: side(n_sides)               !! motions of the sides in the order left, right, bottom, top
     real(real64) :: epoch = 0.0_real64          !! time origin of all clocks, measured from the start of the run [time]
-    type(side_state_t) :: side(n_sides)
   contains
     procedure :: edges
     procedure :: periods
@@ -81,7 +81,7 @@ contains
     end do
   end function new_box
 
-  !> Adds groups of obstacles. The caller sets the shapes of the obstacles later.
+  !> Adds groups of obstacles, whose shapes the caller sets later.
   subroutine add_obstacles(self, name, n)
     class(box_t), intent(inout) :: self
     character(len=*), intent(in) :: name(:)     !! name of each group
@@ -116,7 +116,7 @@ contains
     lengths = self%upper - self%lower
   end function edges
 
-  !> Period of the box along each axis. Along an axis with walls, the period is set to the constant `never`, a very large number.
+  !> Period of the box along each axis; `never`, a very large number, along an axis with walls.
   pure function periods(self) result(lengths)
     class(box_t), intent(in) :: self
     real(real64) :: lengths(2)
@@ -124,8 +124,8 @@ contains
     lengths = merge(self%upper - self%lower, never, self%periodic)
   end function periods
 
-  !> The periodic images of the box, for times relative to the time origin `epoch`. If the argument `epoch` is absent, the result
-  !> contains the images at the start of the run.
+  !> Periodic images of the box, for times relative to the time origin `epoch`; by default the start
+  !> of the run.
   pure function images_of(self, epoch) result(images)
     class(box_t), intent(in) :: self
     real(real64), intent(in), optional :: epoch    !! [time]
@@ -144,8 +144,8 @@ contains
     yes = any(abs(self%gravity) > 0)
   end function has_gravity
 
-  !> Whether the box is sheared, with the boundary conditions of Lees and Edwards (Journal of Physics C 5, 1921 (1972)). The
-  !> periodic image above a sheared box moves along x.
+  !> Whether the box is sheared, with the boundary conditions of Lees and Edwards (Journal of
+  !> Physics C 5, 1921 (1972)): the periodic image above the box moves along x.
   pure function is_sheared(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -161,8 +161,8 @@ contains
     v = self%shear_rate*(self%upper(2) - self%lower(2))
   end function shear_velocity
 
-  !> Velocity of the linear shear profile at the point x. If velocities are measured relative to the shear profile, their averages
-  !> are the same everywhere in the box.
+  !> Velocity of the linear shear profile at the point x. Relative to this profile, the mean
+  !> velocity is the same everywhere in the box.
   pure function shear_profile(self, x) result(v)
     class(box_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -188,7 +188,7 @@ contains
     if (allocated(self%obstacle)) n = size(self%obstacle, kind=int32)
   end function n_obstacles
 
-  !> Index of the surface that corresponds to the code of a side or obstacle.
+  !> Index of the surface that has the given boundary id.
   elemental function surface_of(self, code) result(k)
     class(box_t), intent(in) :: self
     integer(int32), intent(in) :: code
@@ -235,21 +235,22 @@ contains
     highest = maxval(self%surface%law%temperature)
   end function highest_temperature
 
-  !> The highest speed at which any boundary moves: the maximum of the tangential speeds of surfaces, the speeds of moving sides,
-  !> and the speed of the periodic image above a sheared box.
+  !> Highest speed of any boundary: of surfaces that slide, sides that move, and the periodic image
+  !> above a sheared box.
   pure function highest_speed(self) result(highest)
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [length/time]
 
-    highest = max(maxval(abs(self%surface%law%speed)), maxval(self%surface%motion%highest_speed()), abs(self%shear_velocity()))
+    highest = max(maxval(abs(self%surface%law%speed)), maxval(self%side%highest_speed()), abs(self%shear_velocity()))
   end function highest_speed
 
-  !> Whether boundaries can do work on disks: by tangential or normal motion, by the force on a piston, or by shear.
+  !> Whether boundaries can do work on disks: by sliding, by moving, by the force on a piston, or by
+  !> shear.
   pure function does_work(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
 
-    yes = self%highest_speed() > 0 .or. any(self%surface%motion%kind == piston)
+    yes = self%highest_speed() > 0 .or. any(self%side%is_piston())
   end function does_work
 
   !> Whether disks can gain energy from a wall or from shear.
@@ -260,13 +261,13 @@ contains
     yes = self%highest_temperature() > 0 .or. self%does_work()
   end function gives_energy
 
-  !> Largest outward displacement of each moving side from its mean position. The displacement is also the largest distance by which
-  !> disks can be beyond the mean position of an oscillating side.
+  !> Largest outward displacement of each moving side from its mean position, up to which disks can
+  !> therefore be found beyond the mean position of an oscillating side.
   pure function side_excursion(self) result(length)
     class(box_t), intent(in) :: self
     real(real64) :: length(2, 2)                !! (axis, 1: lower side, 2: upper side) [length]
 
-    length = transpose(reshape(self%surface(:n_sides)%motion%amplitude, [2, 2]))
+    length = transpose(reshape(self%side%reach(), [2, 2]))
   end function side_excursion
 
   !> Inward displacement of side k from its mean position at a given time.
@@ -276,9 +277,7 @@ contains
     real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
     real(real64) :: x                           !! [length]
 
-    associate (motion => self%surface(k)%motion, state => self%side(k))
-      x = motion%position(motion%local_time(self%epoch, t, state), state)
-    end associate
+    x = self%side(k)%position(self%epoch, t)
   end function side_position
 
   !> Inward velocity of side k at a given time.
@@ -288,21 +287,19 @@ contains
     real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
     real(real64) :: v                           !! [length/time]
 
-    associate (motion => self%surface(k)%motion, state => self%side(k))
-      v = motion%velocity(motion%local_time(self%epoch, t, state), state)
-    end associate
+    v = self%side(k)%velocity(self%epoch, t)
   end function side_velocity
 
-  !> Finds the first contact of a disk with any of the given obstacles, if this contact is earlier than an event that is already
-  !> known. A disk that passes a periodic side is shifted back into the box, and its contacts are predicted again. It is therefore
-  !> sufficient to test images of an obstacle that are shifted by at most one period. An obstacle that encloses the disks has no
-  !> images.
+  !> Finds the first contact of a disk with any of the given obstacles, if it precedes the earliest
+  !> event known so far. Images of an obstacle shifted by at most one period are sufficient: a disk
+  !> that passes a periodic side is shifted back into the box, and its contacts are predicted anew.
+  !> An obstacle that encloses the disks has no images.
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> Last collision partner of the disk (`last_partner`), which can be the code of an obstacle
+    !> Last collision partner of the disk (`last_partner`), which can be an obstacle
     integer(int32), intent(in) :: last
-    integer(int32), intent(in) :: list(:)       !! codes of the obstacles to be tested, in descending order
+    integer(int32), intent(in) :: list(:)       !! boundary ids of the obstacles to be tested, in descending order
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     type(images_t) :: images
@@ -319,15 +316,15 @@ contains
     end do
   end subroutine next_obstacle
 
-  !> Finds the contact of a disk with one image of an obstacle, if this contact is earlier than an event that is already known. A
-  !> disk that leaves a convex obstacle on a straight path cannot touch this obstacle again. If the last collision of the disk was
-  !> with the same convex obstacle, a contact without gravity could only result from rounding errors and is not predicted.
+  !> Finds the contact of a disk with one image of an obstacle, if it precedes the earliest event
+  !> known so far. Without gravity, a disk that has just left a convex obstacle cannot touch it
+  !> again before another collision; such a contact would be a rounding error and is not predicted.
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> Last collision partner of the disk (`last_partner`), which can be the code of an obstacle
+    !> Last collision partner of the disk (`last_partner`), which can be an obstacle
     integer(int32), intent(in) :: last
-    integer(int32), intent(in) :: obstacle      !! code of the obstacle
+    integer(int32), intent(in) :: obstacle      !! boundary id of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
@@ -345,12 +342,12 @@ contains
     code = obstacle
   end subroutine find_image_contact
 
-  !> Whether a disk certainly does not touch one image of an obstacle before the time t. The result .false. means that the disk may
-  !> touch the image. The test costs much less than the calculation of the contact time.
+  !> Whether a disk is certain to miss one image of an obstacle before the time t; if not, it may
+  !> touch it. This test costs much less than calculating the contact time.
   pure function stays_clear(box, disk, obstacle, shift, t, falling) result(yes)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    integer(int32), intent(in) :: obstacle      !! code of the obstacle
+    integer(int32), intent(in) :: obstacle      !! boundary id of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
     real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
     logical, intent(in) :: falling              !! whether gravity acts on the disk
@@ -369,10 +366,11 @@ contains
     end associate
   end function stays_clear
 
-  !> Whether a point on a straight path certainly stays outside of a circle around the origin during a given time. The result
-  !> .false. means that the point may enter the circle. If the obstacle is the circle itself, a point that moves away from the
-  !> centre does not touch the obstacle. The radius of the circle is enlarged by a margin that exceeds all rounding errors. A
-  !> contact before the time s requires c < -2 b s, as in `neighbour_search: earliest_contact`.
+  !> Whether a point on a straight path is certain to stay outside a circle around the origin for a
+  !> given time; if not, it may enter it. The radius is enlarged by a margin that exceeds all
+  !> rounding errors. A contact before the time s requires c < -2 b s, as in `neighbour_search:
+  !> earliest_contact`. If the circle is the obstacle itself, a point moving away from its centre
+  !> cannot touch it.
   pure function passes_by(d, v, s, rho, is_round) result(yes)
     real(real64), intent(in) :: d(2)            !! initial position [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
@@ -390,10 +388,10 @@ contains
     yes = (min(disc, -2*b*s - c) < 0 .and. c > 0) .or. (is_round .and. b >= 0)
   end function passes_by
 
-  !> Like `passes_by`, for a falling point. The parabolic path of the point lies in a triangle whose corners are the two ends of the
-  !> path, and the position that the point would reach without gravity in half the time. The circle does not overlap the triangle if
-  !> a line that is parallel or perpendicular to the chord of the path (the line between its two ends) separates the circle from all
-  !> three corners.
+  !> Version of `passes_by` for a falling point. Its parabolic path lies in the triangle formed by
+  !> the two ends of the path and the position that would be reached in half the time without
+  !> gravity. The circle misses the triangle if all three corners lie behind a line parallel or
+  !> perpendicular to the chord between the two ends.
   pure function falls_past(d, v, g, s, rho) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), s, rho
     logical :: yes
@@ -415,9 +413,9 @@ contains
     yes = clear > 0 .and. clear*clear > rho*rho*chord2
   end function falls_past
 
-  !> Whether a falling point certainly stays outside of a rectangle around the origin during a given time. The result .false. means
-  !> that the point may enter the rectangle. The test uses the bounding rectangle of the path, which costs much less than the
-  !> solution of a quartic equation.
+  !> Whether a falling point is certain to stay outside a rectangle around the origin for a given
+  !> time; if not, it may enter it. Testing the bounding rectangle of the path costs much less than
+  !> solving a quartic equation.
   pure function stays_outside(d, v, g, s, half) result(yes)
     real(real64), intent(in) :: d(2)            !! initial position [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
@@ -438,7 +436,8 @@ contains
     end do
   end function stays_outside
 
-  !> Distance between the m-th obstacle and the boundary of a disk with its centre at x; negative if the disk overlaps the obstacle.
+  !> Distance between the m-th obstacle and the rim of a disk centred at x; negative if the two
+  !> overlap.
   pure function obstacle_gap(box, m, x, radius) result(length)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: m
@@ -480,15 +479,16 @@ contains
 
     u = 0
     if (.not. is_side(code)) return
-    if (box%surface(1 - code)%motion%kind /= still) u = box%side_velocity(1 - code, t)*normal
+    if (allocated(box%side(1 - code)%motion)) u = box%side_velocity(1 - code, t)*normal
   end function normal_surface_velocity
 
-  !> Unit normal vector of a surface, towards a disk at the position x that touches the surface with the velocity v.
+  !> Unit normal vector of a surface at its contact with a disk. It points from the surface to the
+  !> disk.
   pure function wall_normal(box, code, x, v) result(normal)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
-    real(real64), intent(in) :: x(2)            !! [length]
-    real(real64), intent(in) :: v(2)            !! [length/time]
+    real(real64), intent(in) :: x(2)            !! centre of the disk [length]
+    real(real64), intent(in) :: v(2)            !! velocity of the disk [length/time]
     real(real64) :: normal(2), d(2)
 
     if (is_side(code)) then
@@ -502,8 +502,8 @@ contains
     end if
   end function wall_normal
 
-  !> Accessible area: the area of the box minus the areas of all obstacles that disks touch from outside. If an obstacle encloses
-  !> the disks and is smaller than the box, the area inside this obstacle replaces the area of the box.
+  !> Accessible area: the area of the box, or of a smaller obstacle that encloses the disks, minus
+  !> that of all obstacles that disks touch from outside.
   pure function free_area(box) result(area)
     type(box_t), intent(in) :: box
     real(real64) :: area                        !! [length**2]

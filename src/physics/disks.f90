@@ -1,24 +1,23 @@
-!> Data of the disks, grouped by the frequency of access. The record of a disk occupies one cache line and is read in every
-!> prediction. The tag of a disk occupies half a cache line and is needed only in events of the disk itself. Optional data of disks
-!> are in arrays that exist only in some simulations. Derived data of the disks are not stored in checkpoints, because they are
-!> recomputed at every start.
+!> Data of the disks, grouped by how often they are needed. The record of a disk fills one cache line and is read in every
+!> prediction. Its tag fills half a cache line and is read only in events of the disk itself. Arrays of optional data exist only in
+!> some simulations. Derived data are not stored in checkpoints but recomputed whenever a run starts or resumes.
 module disks
   use free_flight, only: flight, flight_velocity
-  use kinds, only: int16, int32, int64, never, real64
+  use kinds, only: int16, int32, int64, largest_exact, never, real64
   implicit none
   private
-  public :: disk_t, extra_t, series_t, species_t, tag_t, whole_disk_t
-  public :: disks_before, advance_disk, longest_name, names_of, species_by_id
+  public :: disk_t, extra_t, series_t, source_t, species_t, tag_t, whole_disk_t
+  public :: disks_before, advance_disk, list_by_id, longest_name, names_of, species_by_id
 
-  !> Position, velocity and clock of a disk change only in the collisions of this disk, and when the disk passes a periodic side.
-  !> The position of a disk at another time follows from its stored position and velocity.
+  !> Position, velocity and clock of a disk change only in its own collisions and when it passes a periodic side. At other times,
+  !> its position is extrapolated from them.
   type :: disk_t
     real(real64) :: x(2) = 0.0_real64           !! position at `clock` [length]
     real(real64) :: v(2) = 0.0_real64           !! velocity at `clock` [length/time]
     real(real64) :: clock = 0.0_real64          !! time of `x` and `v`, relative to the time origin `box%epoch` [time]
     real(real64) :: radius = 0.0_real64         !! [length]
-    ! Derived data: the collision counter, and the next event as predicted by the search. The collision counter is the number of
-    ! changes of x and v of the disk in the present epoch. A changed collision counter shows that an event is stale.
+    ! Derived data: the collision counter, and the next event as predicted by the search. The counter is the number of changes of x
+    ! and v in the present epoch; if the counter of the partner has changed, an event is stale.
     integer(int32) :: collision_counter = 0
     integer(int32) :: partner = 0               !! partner in the next event: index of a disk (> 0), or another code of `partners`
     real(real64) :: event_time = 0.0_real64     !! time of the next event, relative to the time origin `box%epoch` [time]
@@ -28,8 +27,8 @@ module disks
     integer(int32) :: species = 1               !! index of the species
     integer(int32) :: id = 0                    !! number of the disk in the order of the input file
     integer(int64) :: collisions = 0            !! number of events of the disk since the start of the run
-    integer(int32) :: last_partner = 0  !! last collision partner: id of a disk, code of an obstacle, or 0
-    ! Derived data, which the search and the event queue use.
+    integer(int32) :: last_partner = 0  !! last collision partner: id of a disk, boundary id of an obstacle, or 0
+    ! Derived data for the search and the event queue.
     integer(int16) :: cell(2) = 0_int16         !! column and row in the cell grid
     integer(int32) :: window = 0                !! time window to which the event queue has assigned the event
     integer(int32) :: partner_counter = 0       !! collision counter of the partner at the time of the prediction
@@ -37,24 +36,41 @@ module disks
 
   integer, parameter :: longest_name = 40            !! largest length of the name of a species
 
-  !> A species: all its disks have the same contact law and, unless a file contains individual masses, the same mass.
+  !> A species, whose disks have the same contact law and, unless masses are read from a file, the same mass.
   type :: species_t
     character(len=:), allocatable :: name
     integer :: count = 0
-    real(real64) :: mass = 1.0_real64           !! mass of each disk; largest mass if the masses differ [mass]
+    real(real64) :: mass = 1.0_real64           !! mass of each disk; the largest one if they differ [mass]
   end type species_t
+
+  !> A source, through which waiting disks of a species enter the box at the multiples of its interval, at random free positions.
+  type :: source_t
+    character(len=:), allocatable :: name
+    integer :: species = 1                      !! index of the species
+    real(real64) :: region(4) = 0.0_real64      !! region in which the disks enter: xlo, xhi, ylo, yhi [length]
+    real(real64) :: interval = never            !! [time]
+    integer :: count = 1                        !! largest number of disks that enter at one time
+    real(real64) :: velocity(2) = 0.0_real64    !! velocity of entering disks, if `temperature` is 0 [length/time]
+    !> kT of the Maxwell distribution from which velocities of entering disks are drawn; 0 if they are not drawn [energy]
+    real(real64) :: temperature = 0.0_real64
+    real(real64) :: start_time = 0.0_real64     !! earliest time at which disks enter [time]
+    real(real64) :: end_time = never            !! latest time at which disks enter [time]
+  contains
+    procedure :: next_multiple
+    procedure :: speed2
+  end type source_t
 
   !> Optional data of a disk, which exist only if `simulation_state: has_extra` is .true.
   type :: extra_t
-    !> Integer number of periods by which the disk has moved along each axis; the unwrapped position is x + image*edges.
+    !> Image counters, stored as reals: number of periods crossed along each axis. The unwrapped
+    !> position is x + image*edges.
     real(real64) :: image(2) = 0.0_real64
     real(real64) :: last_contact = 0.0_real64   !! time of the last contact (TC model), relative to `box%epoch` [time]
     real(real64) :: spin = 0.0_real64           !! angular velocity [1/time]
     real(real64) :: angle = 0.0_real64          !! orientation at `clock`, unwrapped [radian]
   end type extra_t
 
-  !> Membership of a disk in a series, which consists of the collisions of one time that are connected through shared disks. See
-  !> `collapses`.
+  !> Membership of a disk in a series: collisions at one and the same time that are connected by shared disks (see `collapses`).
   type :: series_t
     real(real64) :: time = -never               !! time of the last series, relative to the time origin `box%epoch` [time]
     !> Id of a disk of the same series, which leads to the disk that represents the series
@@ -62,11 +78,11 @@ module disks
     integer(int32) :: disks = 0                 !! number of disks in the series that this disk represents
     integer(int64) :: collisions = 0            !! number of collisions in the series that this disk represents
     integer(int64) :: known_until = 0           !! number of events of this disk up to which no collapse is possible
-    !> Smallest number of events until the disk is examined again, see `collapses: judge`
+    !> Smallest number of events until the disk is examined again (see `collapses: judge`)
     integer(int64) :: patience = 0
   end type series_t
 
-  !> All data of one disk, combined in one type so that they can be copied together.
+  !> All data of one disk in a single type, so that they can be copied together.
   type :: whole_disk_t
     type(disk_t) :: disk
     type(tag_t) :: tag
@@ -75,6 +91,21 @@ module disks
   end type whole_disk_t
 
 contains
+
+  !> Lists the indices of the chosen disks, in the order of their ids.
+  pure subroutine list_by_id(tag, chosen, index)
+    type(tag_t), intent(in) :: tag(:)
+    logical, intent(in) :: chosen(:)
+    integer(int32), allocatable, intent(out) :: index(:)
+    integer(int32), allocatable :: index_of(:)  ! index of each chosen disk, by id; 0 for all other disks
+    integer(int32) :: i
+
+    allocate (index_of(size(tag)), source=0_int32)
+    do i = 1, size(tag, kind=int32)
+      if (chosen(i)) index_of(tag(i)%id) = i
+    end do
+    index = pack(index_of, index_of > 0)
+  end subroutine list_by_id
 
   !> Advances a disk along its free flight to the time t.
   pure subroutine advance_disk(disk, gravity, t)
@@ -89,6 +120,34 @@ contains
     disk%collision_counter = disk%collision_counter + 1
   end subroutine advance_disk
 
+  !> Number of the first multiple of the interval after a given time and between start and end of the source; 0 if there is none.
+  !> A multiple within a few rounding errors of the start or the end counts as inside (3 x 0.1 > 0.3 in double precision).
+  pure function next_multiple(self, after) result(k)
+    class(source_t), intent(in) :: self
+    real(real64), intent(in) :: after             !! time since the start of the run [time]
+    integer(int64) :: k
+    real(real64) :: first, last                   ! [time]
+
+    k = 0
+    first = self%start_time - 4*spacing(self%start_time)
+    last = self%end_time + 4*spacing(self%end_time)
+    if (self%count == 0 .or. max(after, first) >= largest_exact*self%interval) return
+    k = max(int(max(after, first)/self%interval, int64) - 1, 1_int64)
+    do while (k*self%interval <= after .or. k*self%interval < first)
+      k = k + 1
+    end do
+    if (k*self%interval > last) k = 0
+  end function next_multiple
+
+  !> Mean square of the velocity of entering disks.
+  elemental function speed2(self, mass)
+    class(source_t), intent(in) :: self
+    real(real64), intent(in) :: mass              !! [mass]
+    real(real64) :: speed2                        !! [(length/time)**2]
+
+    speed2 = 2*self%temperature/mass + sum(self%velocity**2)
+  end function speed2
+
   !> Names of the species.
   pure function names_of(species) result(names)
     class(species_t), intent(in) :: species(:)
@@ -100,7 +159,7 @@ contains
     end do
   end function names_of
 
-  !> Number of disks in all species before species s. Disks of earlier species have lower ids than the disks of species s.
+  !> Number of disks in all species before species s; their ids are lower than those of species s.
   pure function disks_before(species, s) result(n)
     class(species_t), intent(in) :: species(:)
     integer, intent(in) :: s

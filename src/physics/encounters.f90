@@ -1,5 +1,5 @@
-!> Executes events: applies the contact law when two disks or a disk and a wall collide, moves disks through periodic sides, and
-!> updates counters and sums. Both the event-driven and the time-stepped dynamics use the module `encounters`.
+!> Executes events: applies the contact law to colliding disks and walls, moves disks through periodic sides, and updates counters
+!> and sums. Used by both the event-driven and the time-stepped dynamics.
 module encounters
   use kinds, only: int32, int64, real64
   use collisions, only: pair_impulse, tangential_impulse
@@ -10,23 +10,51 @@ module encounters
   use partners, only: axis_of, is_side, is_wall, sense_of
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
-  use tally, only: dissipated, heat_virial, stress, virial, work
+  use tally, only: dissipated, heat_virial, outflow, stress, virial, work
   use texts, only: written
   use boundary_collisions, only: collide_wall
   implicit none
   private
-  public :: are_in_contact, collide, collide_pair, encounter_text, is_periodic_side, pass_side, relative_motion
+  public :: are_in_contact, collide, depart, encounter_text, energy_of, execute_collision, is_passage, need_general, pass_side
+  public :: relative_motion
 
-  !> Ratio of masses above which the velocity change of the heavy disk loses significant digits.
+  !> Mass ratio above which the velocity change of the heavy disk loses significant digits.
   real(real64), parameter :: far_heavier = 2.0_real64**20
 
 contains
 
-  !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or an obstacle. `collide` is the
-  !> general procedure for rotation, friction, velocity-dependent restitution, the virial tensor and the event log. `collide_pair`
-  !> is the fast procedure for collisions of smooth disks with constant restitution, without the virial tensor and the event log.
-  !> The log entry does not depend on which of the two disks predicted the event. If the two disks are still in contact after their
-  !> last collision, no new collision is executed.
+  !> Whether all collisions need the general procedure `collide`. An event log needs it as well.
+  pure function need_general(sim) result(yes)
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = sim%features%need_general_collision() .or. sim%law%by_speed%speed > 0
+  end function need_general
+
+  !> Executes the collision of disk i at the time t with the partner `code`, by the general procedure or by the fast ones for pairs
+  !> and walls.
+  subroutine execute_collision(sim, i, code, t, counts, general, log)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: code           !! index of a disk (> 0), or boundary id (see `partners`)
+    real(real64), intent(in) :: t
+    logical, value :: counts                     !! whether the collision is included in the tally and the log
+    logical, value :: general                    !! whether the general procedure is needed
+    type(event_log_t), intent(inout), optional :: log
+
+    if (general) then
+      call collide(sim, i, code, t, counts, log)
+    else if (code > 0) then
+      call collide_pair(sim, i, code, t, counts, sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species))
+    else
+      call collide_wall(sim, i, code, t, counts)
+    end if
+  end subroutine execute_collision
+
+  !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or an obstacle. This general
+  !> procedure handles rotation, friction, velocity-dependent restitution, the virial tensor and the event log; `collide_pair` is
+  !> the fast one for smooth disks without these features. The log entry does not depend on which of the two disks predicted the
+  !> event. A pair still in contact after its last collision is skipped.
   subroutine collide(sim, i, code, t, counts, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -97,7 +125,7 @@ contains
     dx = sim%disk(j)%x - sim%disk(i)%x
     dv = sim%disk(j)%v - sim%disk(i)%v
     if (any(sim%box%periodic)) then
-      ! Few pairs touch across a periodic side
+      ! Few contacts are across a periodic side.
       if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call use_nearest_image(sim, t, dx, dv)
     end if
     b = dx(1)*dv(1) + dx(2)*dv(2)
@@ -109,12 +137,12 @@ contains
       mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    ! The velocity change is the impulse divided by the mass. A multiplication by a stored reciprocal mass is not used, because it
-    ! would repeat the same rounding error in all collisions.
+    ! The impulse is divided by the mass: multiplication by a stored reciprocal mass would repeat the same rounding error in all
+    ! collisions.
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
-    ! Rounding errors can leave a residual approach velocity of the two disks.
+    ! Rounding errors can leave the two disks with a residual approach velocity.
     if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call remove_residual_approach(sim, i, j)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
@@ -185,9 +213,8 @@ contains
     call remove_residual_approach(sim, i, j)
   end subroutine apply_tangential_impulse
 
-  !> Change of the momentum of disk i in a collision with a surface or with disk j. If disk i is far heavier than its partner,
-  !> rounding errors dominate the velocity change of disk i. The momentum change of a far heavier disk is therefore computed from
-  !> the velocity change of its partner.
+  !> Change of the momentum of disk i in a collision with a surface or with disk j. If i is far heavier than j, rounding errors
+  !> dominate its own velocity change, and the momentum change is computed from that of j.
   pure function momentum_change(sim, i, j, v, w) result(change)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
@@ -217,7 +244,7 @@ contains
     end if
   end function impulse_between
 
-  !> Whether disk i is so much heavier than disk j that the velocity change of disk i has lost significant digits.
+  !> Whether disk i is so much heavier than disk j that its velocity change loses significant digits.
   pure function is_far_heavier(sim, i, j) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -251,8 +278,8 @@ contains
     energy_gain = 0.5_real64*sim%mass_of(i)*dot_product(sim%disk(i)%v - before, sim%disk(i)%v + before)
   end function energy_gain
 
-  !> Adds a collision of disks i and j to the virial tensor, to the collisional heat flux, and to the work of the shear. The shear
-  !> does work only if the disks collide across the lower or upper boundary of a sheared box.
+  !> Adds a collision of disks i and j to the virial tensor, the collisional heat flux, and the work of the shear, which is done
+  !> only across the lower or upper boundary of a sheared box.
   subroutine add_pair_sums(sim, i, j, change, transferred_energy)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -275,8 +302,8 @@ contains
     call remove_residual_approach(sim, i, j)
   end subroutine add_pair_sums
 
-  !> Replaces the separation and relative velocity of two disks at the time t by those of the first disk and the nearest periodic
-  !> image of the second disk.
+  !> Replaces the separation and relative velocity of two disks at the time t by those of the first
+  !> disk and the nearest periodic image of the second.
   pure subroutine use_nearest_image(sim, t, dx, dv)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: t
@@ -292,9 +319,8 @@ contains
     dv(1) = dv(1) + image%velocity
   end subroutine use_nearest_image
 
-  !> Whether disks i and j, which touch at the time t, are still in contact since their last collision with each other, in the same
-  !> periodic image. No force acts between disks; if two disks in contact approach each other, the approach is therefore a rounding
-  !> error from the shift of one disk by a period.
+  !> Whether disks i and j, touching at the time t, are still in contact after their last collision, through the same periodic
+  !> image. Free disks can then approach each other only because of the rounding error from the shift of one of them by a period.
   pure function are_in_contact(sim, i, j, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -314,9 +340,9 @@ contains
     end associate
   end function are_in_contact
 
-  !> Removes the approach velocity that rounding errors can leave after a collision of two disks. The test for an approach uses the
-  !> same expression as the prediction of contacts, so that no further collision of the two disks is predicted. The procedure does
-  !> not count an event and does not change the clocks of the disks.
+  !> Removes the approach velocity that rounding errors can leave after a collision of two disks. The test uses the same expression
+  !> as the prediction of contacts, so that no further collision of the pair is predicted. No event is counted, and the clocks do
+  !> not change.
   pure subroutine remove_residual_approach(sim, i, j)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -342,17 +368,60 @@ contains
     end associate
   end subroutine remove_residual_approach
 
-  !> Whether a code represents a periodic side.
-  pure function is_periodic_side(sim, code) result(yes)
+  !> Whether a code represents a periodic or an open side, through which disks pass.
+  pure function is_passage(sim, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: code
     logical :: yes
 
     yes = .false.
-    if (is_side(code)) yes = sim%box%periodic(axis_of(code))
-  end function is_periodic_side
+    if (is_side(code)) yes = sim%box%periodic(axis_of(code)) .or. sim%box%open(1 - code)
+  end function is_passage
 
-  !> Moves disk i by one period when it passes a periodic side at the time t. The clock of the disk does not change.
+  !> Lets disk i leave the box through an open side at the time t. The departure is an event, but not a collision. If disk i becomes
+  !> the first waiting disk of a source, the source does not make up for the multiples of its interval before the departure.
+  subroutine depart(sim, i, code, t, log)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: code           !! code of the side: see `partners`
+    real(real64), intent(in) :: t
+    type(event_log_t), intent(inout), optional :: log
+    integer :: k
+
+    call sim%rotate_to(i, t)
+    call advance_disk(sim%disk(i), sim%box%gravity, t)
+    associate (disk => sim%disk(i), tag => sim%tag(i), tally => sim%tally)
+      call tally%flow(outflow)%add(energy_of(sim, i))
+      do k = 1, size(sim%source_time)
+        if (sim%source(k)%species /= tag%species .or. tally%inside(tag%species) < sim%species(tag%species)%count) cycle
+        sim%source_time(k) = max(sim%source_time(k), nearest(sim%box%epoch + t, -1.0_real64))
+      end do
+      tally%events = tally%events + 1
+      tally%left(1 - code) = tally%left(1 - code) + 1
+      tally%inside(tag%species) = tally%inside(tag%species) - 1
+      tag%collisions = tag%collisions + 1
+      tag%last_partner = 0
+      disk%v = 0
+      if (allocated(sim%extra)) sim%extra(i)%image = 0
+      if (allocated(sim%extra)) sim%extra(i)%spin = 0
+      sim%waits(tag%id) = .true.
+      if (present(log)) call log%append([sim%box%epoch + t, real([tag%id, code], real64), [0.0_real64, 0.0_real64, 0.0_real64]])
+    end associate
+  end subroutine depart
+
+  !> Kinetic, rotational and potential energy of disk i at its clock. The potential energy is zero at the origin of the coordinates.
+  pure function energy_of(sim, i) result(energy)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    real(real64) :: energy
+
+    associate (disk => sim%disk(i))
+      energy = sim%mass_of(i)*(0.5_real64*dot_product(disk%v, disk%v) - dot_product(sim%box%gravity, disk%x))
+    end associate
+    if (sim%features%rotation) energy = energy + 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
+  end function energy_of
+
+  !> Moves disk i by one period as it passes a periodic side at the time t. Its clock does not change.
   subroutine pass_side(sim, i, code, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -372,9 +441,8 @@ contains
     end associate
   end subroutine pass_side
 
-  !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards). The position of the disk is shifted by the
-  !> displacement of the periodic image, and the velocity of the disk by the velocity of the image. The shift of the position and
-  !> velocity is a change of the reference frame: no force acts on the disk.
+  !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards), shifting its position by the displacement of
+  !> the periodic image and its velocity by that of the image. The reference frame changes; no force acts on the disk.
   subroutine pass_sheared_boundary(sim, i, rows, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -395,10 +463,10 @@ contains
     end associate
   end subroutine pass_sheared_boundary
 
-  !> Part of a message: a text that identifies disk i, its partner and the present time.
+  !> Part of a message: disk i, its partner and the present time.
   pure function encounter_text(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i, code           !! index of the disk and code of its partner: see `partners`
+    integer(int32), intent(in) :: i, code           !! index of the disk and code of its partner (see `partners`)
     character(len=:), allocatable :: text
 
     text = disk_text(i)
@@ -413,7 +481,7 @@ contains
 
   contains
 
-    !> Text that contains the number and the species of a disk.
+    !> Part of a message: number and species of a disk.
     pure function disk_text(k) result(words)
       integer(int32), intent(in) :: k
       character(len=:), allocatable :: words

@@ -1,5 +1,5 @@
-!> Event log: a list of the collisions that have not been written to the output file yet. The dynamics appends collisions to the
-!> list, and the caller writes the collisions and empties the list.
+!> Event log: the collisions that have not been written to the output file yet. The dynamics appends
+!> collisions; the caller writes them and empties the list.
 module event_log
   use kinds, only: real64
   implicit none
@@ -9,12 +9,13 @@ module event_log
   integer, parameter :: record_length = 6, first_room = 1024
 
   type :: event_log_t
-    !> Largest number of entries; the dynamics returns to the caller when the log contains this number of entries.
+    !> Number of entries at which the dynamics returns to the caller.
     integer :: most = huge(0)
     integer :: n = 0                              !! number of entries
-    !> (6, at least n) One column per collision. A column contains the time since the start of the run [time], the ids of disks i
-    !> and j, and the magnitude and the two components of the momentum change of disk i [mass length/time]. In a collision with a
-    !> wall, the code of the surface replaces the id of disk j: see `partners`.
+    !> (6, at least n) One column per collision: the time since the start of the run [time], the ids
+    !> of disks i and j, and the magnitude and the two components of the momentum change of disk i
+    !> [mass length/time]. In collisions with walls, the boundary id replaces the id of disk j (see
+    !> `partners`).
     real(real64), allocatable :: record(:, :)
   contains
     procedure :: append
@@ -23,7 +24,7 @@ module event_log
 
 contains
 
-  !> Whether the log is full and has to be emptied; .false. without a log.
+  !> Whether the log is full and has to be emptied; .false. if there is no log.
   pure function is_full(log) result(yes)
     type(event_log_t), intent(in), optional :: log
     logical :: yes
@@ -43,7 +44,7 @@ contains
     self%record(:, self%n) = record
   end subroutine append
 
-  !> Deletes the oldest entries of a log that has become twice as long as necessary.
+  !> Deletes the oldest entries once the log is twice as long as necessary.
   pure subroutine keep(self, least)
     class(event_log_t), intent(inout) :: self
     integer, intent(in) :: least                    !! number of latest entries to be kept

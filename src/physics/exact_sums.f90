@@ -1,4 +1,4 @@
-!> Sums that are bit-identical for any order of their terms. The sums are stored as fixed-point numbers.
+!> Sums stored as fixed-point numbers, bit-identical for any order of their terms.
 module exact_sums
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use kinds, only: int64, int128, real64
@@ -11,12 +11,12 @@ module exact_sums
   real(real64), parameter :: most_units = 2.0_real64**digits_of_bound
   real(real64), parameter :: rare_unit = 2.0_real64**digits_of_rare
   integer, parameter :: digits_of_most = 125
-  !> Limit of the integer `rare` of a sum. If `rare` reaches the limit, the value of the sum is NaN.
+  !> Limit of the component `rare` of a sum, beyond which its value is NaN.
   integer(int128), parameter :: most = 2_int128**digits_of_most
 
-  !> A fixed-point sum. The addition of a term that exceeds the bound passed to `choose_unit` is exact but takes slightly longer. A
-  !> sum of 2**35 terms below 2**90 units cannot overflow. For terms of at least 2**90 units, the integer `rare` stores the number
-  !> of multiples of 2**90 units.
+  !> A fixed-point sum. Terms above the bound passed to `choose_unit` are also added exactly, at a
+  !> slightly higher cost. 2**35 terms below 2**90 units cannot overflow; of larger terms, the
+  !> multiples of 2**90 units are counted in `rare`.
   type :: exact_sum_t
     integer(int128) :: units = 0
     integer(int128) :: rare = 0                          !! number of multiples of 2**90 units
@@ -33,8 +33,8 @@ module exact_sums
 
 contains
 
-  !> Sets the unit of the sum such that a term as large as `bound` is represented with 62 binary digits. If the sum already contains
-  !> terms, they are converted to the new unit.
+  !> Chooses the unit such that a term as large as `bound` has 62 binary digits. Terms already added
+  !> are converted to the new unit.
   elemental subroutine choose_unit(self, bound)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: bound
@@ -80,8 +80,8 @@ contains
     self%rare = left
   end subroutine make_coarser
 
-  !> Adds a term, which is rounded to a multiple of the unit. Without rounding, the errors of many small terms would have the same
-  !> sign.
+  !> Adds a term, rounded to a multiple of the unit. With truncation instead, the errors of many
+  !> small terms would have the same sign.
   elemental subroutine add(self, term)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: term
@@ -98,8 +98,8 @@ contains
     end if
   end subroutine add
 
-  !> Adds a very large term in two parts. The two parts of the term are exact, because a number in double precision has fewer digits
-  !> than each of the two integers that represent the sum.
+  !> Adds a very large term in two parts. Both are exact, because a double-precision number has
+  !> fewer digits than either of the two integers that represent the sum.
   elemental subroutine add_rare(self, units)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: units
@@ -132,7 +132,7 @@ contains
     self%rare = 0
   end subroutine clear
 
-  !> The value of the sum, which is NaN if the sum has become too large.
+  !> Value of the sum; NaN if it has become too large.
   elemental function value(self)
     class(exact_sum_t), intent(in) :: self
     real(real64) :: value

@@ -1,11 +1,13 @@
-!> Observables other than frames: averages over disks, totals, and the counters and sums over collisions.
+!> All observables: averages over disks, totals, and the counters and sums over collisions.
 module observables
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use kinds, only: int32, real64
   use box_geometry, only: box_t, free_area
   use box_sides, only: bounds
-  use drive, only: recycle
+  use features, only: features_t
   use partners, only: n_sides
   use simulation_state, only: simulation_t
+  use tally, only: inflow, outflow
   use tally, only: kinetic_flux, dissipated, drive_energy, flux_changes, gain, heat, heat_virial, impulse, stress, virial, work
   implicit none
   private
@@ -29,22 +31,21 @@ module observables
     procedure :: values
   end type observable_list_t
 
-  !> Positions of the sums over the disks of a species, or over all disks, in the first dimension of an array of sums.
+  !> Positions, in the first dimension of an array of sums, of the sums over the disks of a species or over all disks.
   integer, parameter :: disks = 1, mass = 2, speed = 3, momentum = 4       !! momentum has two components
   integer, parameter :: kinetic = 6, potential = 7, rotational = 8         !! energies
   !> Kinetic energy and momentum relative to the velocity profile of a sheared box; the momentum has two components.
   integer, parameter :: own_kinetic = 9, own_momentum = 10
-  integer, parameter :: flux = 12  !! kinetic flux relative to the velocity profile, five components: see `tally: kinetic_flux`
+  integer, parameter :: flux = 12  !! kinetic flux relative to the velocity profile, five components (see `tally: kinetic_flux`)
   integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
-  !> Last of the sums that each disk adds a term to. A new sum follows the kinetic flux and becomes the last one.
+  !> Position of the last sum over disks; a new sum is inserted after the kinetic flux and becomes the last one.
   integer, parameter :: last_term = flux + 4
-  !> Total energy (`energy`), and the rounding error of its summation (`lost`). The sums `energy` and `lost` are computed only in
-  !> driven simulations.
+  !> Total energy (`energy`) and rounding error of its summation (`lost`), both computed only in driven simulations.
   integer, parameter :: energy = last_term + 1, lost = last_term + 2
 
 contains
 
-  !> All observables with their present values. To introduce a new observable, add a line in this procedure.
+  !> Present values of all observables. To add an observable, add a line here.
   pure function observed(sim) result(list)
     type(simulation_t), intent(in) :: sim
     type(observable_list_t) :: list
@@ -52,28 +53,31 @@ contains
     character(len=:), allocatable :: path
     real(real64) :: flux_integral(5)                          ! time integrals of the fluxes [energy time], [energy length]
     real(real64) :: at(2, 2)                          ! positions of the lower and upper sides [length]
+    logical :: changes                                ! whether the system changes during the run
     integer :: s, k
 
+    changes = sim%changes > 0 .or. sim%features%changes
     call add_up(sim, sums)
-    call add_means(list, "all", sums(:, 0), sim%features%rotation)
+    call add_means(list, "all", sums(:, 0), sim%features)
     do s = 1, size(sim%species)
-      call add_means(list, sim%species(s)%name, sums(:, s), sim%features%rotation)
+      call add_means(list, sim%species(s)%name, sums(:, s), sim%features)
     end do
     call list%add("total_energy", [total(sim, sums(:, 0))])
     call list%add("momentum", sums(momentum:momentum + 1, 0))
     call list%add("virial_pressure", [pressure(sim, sums(own_kinetic, 0))])
     call list%add("virial", [sim%tally%total(virial)])
     call list%add("dissipated_energy", [sim%tally%total(dissipated)])
-    if (sim%drive%is_on() .or. sim%changes > 0) call list%add("drive_energy", [sim%tally%total(drive_energy)])
-    if (allocated(sim%recycled)) call list%add("recycled", real([sum(sim%recycled)], real64), is_count=.true.)
+    if (allocated(sim%drive) .or. changes) call list%add("drive_energy", [sim%tally%total(drive_energy)])
+    if (allocated(sim%drive_count)) call list%add(sim%kick_counter(), real([sum(sim%drive_count)], real64), is_count=.true.)
     call list%add("collisions", real([sim%tally%collisions], real64), is_count=.true.)
     associate (hits => sim%tally%surface_collisions, surface_sums => sim%tally%surface_sums)
       call list%add("side_collisions", real(hits(:n_sides), real64), is_count=.true.)
       call list%add("side_impulse", abs([surface_sums(impulse, 1:2)%value(), surface_sums(impulse + 1, 3:4)%value()]))
       call list%add("obstacle_collisions", real([sum(hits(n_sides + 1:))], real64), is_count=.true.)
     end associate
-    if (sim%box%highest_temperature() > 0 .or. sim%changes > 0) call list%add("heat", [sim%tally%total(heat)])
-    if (sim%box%does_work() .or. sim%changes > 0) call list%add("work", [sim%tally%total(work)])
+    if (sim%box%highest_temperature() > 0 .or. changes) call list%add("heat", [sim%tally%total(heat)])
+    if (sim%box%does_work() .or. changes) call list%add("work", [sim%tally%total(work)])
+    if (sim%features%open) call add_exchange(list, sim)
     if (sim%features%stress) then
       call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
       call list%add("kinetic_tensor", sums(tensor, 0))
@@ -90,14 +94,15 @@ contains
       call list%add(path//"/impulse", sim%tally%surface_sums(impulse:impulse + 1, k)%value())
       call list%add(path//"/energy_to_disks", [sim%tally%surface_sums(gain, k)%value()])
       call list%add(path//"/collisions", real([sim%tally%surface_collisions(k)], real64), is_count=.true.)
-      if (.not. sim%box%surface(k)%motion%moves()) cycle
+      if (sim%features%open .and. k <= n_sides) call list%add(path//"/left", real([sim%tally%left(k)], real64), is_count=.true.)
+      if (.not. any((sim%box%side%moves() .or. sim%features%moving) .and. [1, 2, 3, 4] == k)) cycle
       call bounds(sim%box, sim%now, at(:, 1), at(:, 2))
       call list%add(path//"/position", [at((k + 1)/2, 2 - modulo(k, 2))])
       call list%add(path//"/velocity", [sim%box%side_velocity(k, sim%now)])
     end do
   end function observed
 
-  !> The total energy at the present time, precise enough for an energy balance.
+  !> Total energy at the present time, precise enough for an energy balance.
   pure function total_energy(sim) result(now)
     type(simulation_t), intent(in) :: sim
     real(real64) :: now                           !! [energy]
@@ -107,16 +112,33 @@ contains
     now = total(sim, sums(:, 0))
   end function total_energy
 
-  !> Adds the observables that are averages over the disks of a species. The temperature kT is the mean kinetic energy of a disk
-  !> relative to the mean velocity and, in a sheared box, relative to the velocity profile.
-  pure subroutine add_means(list, group, sums, rotation)
+  !> Adds the observables of an open system, the first of which is the total number of disks.
+  pure subroutine add_exchange(list, sim)
+    type(observable_list_t), intent(inout) :: list
+    type(simulation_t), intent(in) :: sim
+    integer :: s
+
+    call list%add("inside", real([sim%n_inside()], real64), is_count=.true.)
+    call list%add("outflow_energy", [sim%tally%flow(outflow)%value()])
+    call list%add("inflow_energy", [sim%tally%flow(inflow)%value()])
+    if (.not. allocated(sim%source)) return
+    do s = 1, size(sim%source)
+      call list%add("sources/"//sim%source(s)%name//"/entered", real([sim%tally%entered(s)], real64), is_count=.true.)
+    end do
+  end subroutine add_exchange
+
+  !> Adds the observables that are averages over the disks of a species; in open systems, averages over no disk are NaN. The
+  !> temperature kT is the mean kinetic energy of a disk relative to the mean velocity and, in a sheared box, to the velocity
+  !> profile.
+  pure subroutine add_means(list, group, sums, features)
     type(observable_list_t), intent(inout) :: list
     character(len=*), intent(in) :: group         !! name of the species, or 'all'
     real(real64), intent(in) :: sums(:)
-    logical, intent(in) :: rotation               !! disks can rotate
+    type(features_t), intent(in) :: features
     real(real64) :: n, drift
 
     n = max(sums(disks), 1.0_real64)
+    if (features%open .and. .not. sums(disks) > 0) n = ieee_value(n, ieee_quiet_nan)
     drift = 0
     associate (p => sums(own_momentum:own_momentum + 1))
       if (sums(disks) > 0) drift = 0.5_real64*dot_product(p, p)/sums(mass)
@@ -125,7 +147,8 @@ contains
     call list%add(group//"/potential_energy", [sums(potential)/n])
     call list%add(group//"/mean_speed", [sums(speed)/n])
     call list%add(group//"/temperature", [max(sums(own_kinetic) - drift, 0.0_real64)/n])
-    if (.not. rotation) return
+    if (features%open) call list%add(group//"/particle_number", sums(disks:disks), is_count=.true.)
+    if (.not. features%rotation) return
     call list%add(group//"/rotational_energy", [sums(rotational)/n])
     call list%add(group//"/rotational_temperature", [2*sums(rotational)/n])
   end subroutine add_means
@@ -147,7 +170,7 @@ contains
     end associate
   end subroutine add
 
-  !> The components of all observables as a flat array.
+  !> Components of all observables as a flat array.
   pure function values(self)
     class(observable_list_t), intent(in) :: self
     real(real64) :: values(sum(self%row(:self%n)%width))
@@ -162,7 +185,7 @@ contains
     end do
   end function values
 
-  !> Names in the HDF5 group /observables that are reserved; a species must not have one of these names.
+  !> Names in the HDF5 group /observables that are reserved and cannot be names of species.
   function own_names() result(names)
     character(len=64), allocatable :: names(:)
     type(simulation_t) :: empty
@@ -170,7 +193,7 @@ contains
     integer :: k
 
     allocate (empty%species(0))
-    empty%drive%kind = recycle
+    empty%changes = 1
     call empty%make_room(0)
     call empty%tally%make_room(n_sides)
     empty%box = box_t()
@@ -178,9 +201,10 @@ contains
     empty%box%surface%law%speed = 1
     empty%features%stress = .true.
     empty%features%helfand = .true.
+    empty%features%open = .true.
     list = observed(empty)
-    allocate (names(list%n + 1))
-    names(list%n + 1) = "obstacles"                 ! name of a group that exists only if the box has obstacles
+    allocate (names(list%n + 2))
+    names(list%n + 1:) = ["obstacles", "sources  "] ! names of groups that exist only if the box has obstacles or sources
     do k = 1, list%n
       associate (name => list%row(k)%name)
         names(k) = name(:index(name//"/", "/") - 1)
@@ -208,8 +232,8 @@ contains
     if (sim%is_driven()) total = sums(energy) + sums(lost)
   end function total
 
-  !> Adds a term to the energy with compensated summation (Neumaier, ZAMM 54, 39 (1974)). Simple summation would lose digits of the
-  !> energy that disks gain from driving, because the gain can be small compared with the total energy of many disks.
+  !> Adds a term to the energy by compensated summation (Neumaier, ZAMM 54, 39 (1974)). The energy gained from driving can be small
+  !> compared with the total energy of many disks; simple summation would lose some of its digits.
   pure subroutine add_energy(sums, term)
     real(real64), intent(inout) :: sums(:)
     real(real64), intent(in) :: term
@@ -240,6 +264,7 @@ contains
     term = 0
     term(disks) = 1
     do i = 1, sim%n_disks()
+      if (.not. sim%is_inside(i)) cycle
       s = sim%tag(i)%species
       v = sim%velocity(i)
       own_v = v
@@ -266,10 +291,10 @@ contains
     end do
   end subroutine add_up
 
-  !> Pressure in two dimensions by the virial theorem, P A = K + W/(2t). K is the present kinetic energy, A is the present
-  !> accessible area, and t is the time since the start of the run. W is the sum of impulse times distance over all collisions of
-  !> disks since the start of the run. Between walls P differs from the mean force per length of a wall, because walls act at the
-  !> distance of a radius on the centres of disks.
+  !> Two-dimensional pressure P by the virial theorem, P A = K + W/(2t): K is the present kinetic energy, A the present accessible
+  !> area, t the time since the start of the run, and W the sum of impulse times distance over all disk-disk collisions since then.
+  !> Between walls, P differs from the mean force per length of a wall, because walls act on the centres of disks at the distance of
+  !> a radius.
   pure function pressure(sim, kinetic)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: kinetic           !! kinetic energy relative to the velocity profile of a sheared box [energy]
@@ -279,7 +304,7 @@ contains
     pressure = kinetic
     if (sim%time() > 0) pressure = pressure + 0.5_real64*sim%tally%total(virial)/sim%time()
     box = sim%box
-    if (any(box%surface%motion%moves_permanently())) call bounds(sim%box, sim%now, box%lower, box%upper)
+    if (any(box%side%moves_permanently())) call bounds(sim%box, sim%now, box%lower, box%upper)
     pressure = pressure/free_area(box)
   end function pressure
 

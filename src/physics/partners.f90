@@ -1,7 +1,11 @@
-!> Defines integer codes for the partners of a disk in an event. The partner is another disk (> 0), a surface of the box (0, -1, -2,
-!> -3 for the left, right, bottom and top side; -4, -5, ... for an obstacle), or the boundary of the cell of the disk (large
-!> negative codes). The event log also uses the codes of surfaces, but identifies disks by their ids. Side k of the box has the code
-!> 1 - k, and the m-th obstacle has the code -3 - m.
+!> Integer codes for the partner of a disk in an event:
+!> - a disk (> 0);
+!> - a surface of the box: 0, -1, -2, -3 for the left, right, bottom and top side; -4, -5, ... for
+!>   obstacles (these are the boundary ids; side k has the code 1 - k, the m-th obstacle -3 - m);
+!> - the boundary of the cell of the disk (large negative codes).
+!>
+!> The event log uses the same boundary ids, but identifies disks by their ids instead of their
+!> indices.
 module partners
   use kinds, only: int32
   implicit none
@@ -11,16 +15,16 @@ module partners
 
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_crossing = -2000000000
-  !> Code of an event that requires a new search: the disk leaves the region in which contacts were searched, but stays in its cell.
-  !> If the disk leaves the region of the search through its right or upper edge, the code is `looks_again` - 1.
+  !> Code of an event after which contacts must be searched anew, because the disk leaves the region
+  !> searched so far but stays in its cell: `looks_again`, or `looks_again` - 1 through the right or
+  !> upper edge.
   integer(int32), parameter :: looks_again = first_crossing - n_sides
   integer(int32), parameter :: nothing = -huge(1_int32)
   character(len=6), parameter :: side_name(n_sides) = ["left  ", "right ", "bottom", "top   "]
 
 contains
 
-  !> Whether a code represents a side of the box. The argument `code` must not be positive, because positive values are indices of
-  !> disks.
+  !> Whether a code <= 0 represents a side of the box.
   elemental function is_side(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -28,8 +32,7 @@ contains
     yes = code > -n_sides
   end function is_side
 
-  !> Whether a code represents a side or an obstacle, and not the boundary of a cell. The argument `code` must not be positive,
-  !> because positive values are indices of disks.
+  !> Whether a code <= 0 represents a side or an obstacle, and not the boundary of a cell.
   elemental function is_wall(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -61,7 +64,8 @@ contains
     axis = 1 - side/2
   end function axis_of
 
-  !> Direction of the outward normal of a side along its axis: +1 for the right and top side, -1 for the left and bottom side.
+  !> Direction of the outward normal of a side along its axis: +1 for the right and top side, -1 for
+  !> the left and bottom side.
   elemental function sense_of(side) result(sense)
     integer(int32), intent(in) :: side
     integer(int32) :: sense
@@ -69,8 +73,8 @@ contains
     sense = 2*modulo(side, 2) - 1
   end function sense_of
 
-  !> The code of the event in which a disk leaves its cell through a face. The left, right, bottom and top faces are identified by
-  !> the corresponding side of the box.
+  !> Code of the event in which a disk leaves its cell through the face on the given side (left,
+  !> right, bottom or top).
   elemental function crossing(side) result(code)
     integer(int32), intent(in) :: side
     integer(int32) :: code
@@ -78,8 +82,7 @@ contains
     code = first_crossing + side
   end function crossing
 
-  !> The side of the box in whose direction a disk leaves its cell. The argument is the code of the event in which the disk leaves
-  !> its cell: see `crossing`.
+  !> Side through which a disk leaves its cell, given the code of the event (see `crossing`).
   elemental function side_crossed(code) result(side)
     integer(int32), intent(in) :: code
     integer(int32) :: side

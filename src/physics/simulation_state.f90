@@ -1,66 +1,102 @@
-!> The complete state of a simulation. Checkpoints contain everything except the values given by the input and the data that
-!> are marked as derived in `disks`.
+!> The complete state of a simulation. Checkpoints store all of it except values given by the input and data marked as derived in
+!> `disks`.
 module simulation_state
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: box_t
   use collisions, only: contact_law_t
-  use disks, only: disk_t, extra_t, series_t, species_by_id, species_t, tag_t, whole_disk_t
-  use drive, only: drive_t
+  use disks, only: disk_t, extra_t, series_t, source_t, species_by_id, species_t, tag_t, whole_disk_t
   use features, only: features_t
+  use fields, only: fields_t
   use free_flight, only: flight, flight_velocity
   use images, only: images_t
   use tally, only: kinetic_flux, flux_changes, tally_t
+  use texts, only: text_t
   implicit none
   private
-  public :: specification_t, simulation_t, system_t
+  public :: change_t, drive_t, specification_t, simulation_t, system_t
 
-  !> Factors that determine the bound for the terms of a sum: see `exact_sums: choose_unit`. The bound is the smaller of two values,
-  !> which are `common` times a typical term of the heaviest disks and `rare` times a typical term of the lightest disks.
-  real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
-  !> Factor by which the units of the sums are multiplied in driven simulations. The work of walls and kicks may be far less than
-  !> the estimate from their parameters. With the factor `finer` the units are so small that the sums resolve the work even if it is
-  !> far less than the estimate.
-  real(real64), parameter :: finer = 2.0_real64**(-30)
+  !> Driving: kicks at all multiples of a time interval, which change velocities or positions of disks. Each kind of driving extends
+  !> this type in a file of the folder `drives`. The abstract type is defined here because the definitions depend on each other: a
+  !> kick changes a simulation, and a simulation contains its driving.
+  type, abstract :: drive_t
+    real(real64) :: interval = never              !! time between kicks [time]
+    integer :: species = 0                        !! index of the only driven species; 0: all species are driven
+  contains
+    procedure(read_drive), deferred :: read
+    procedure(kick), deferred :: kick
+    procedure(mean_square), deferred :: speed2
+    procedure, non_overridable :: acts_on
+    procedure :: acts_on_all
+    procedure :: check
+    procedure :: conflict
+    procedure :: prepare
+    procedure :: orients_disks
+    procedure :: moves_disks
+    procedure :: can_act
+    procedure :: counter
+  end type drive_t
 
   !> The system: box, contact law, driving and features, which together determine the motion of the disks.
   type :: system_t
     type(box_t) :: box
     type(contact_law_t) :: law
-    type(drive_t) :: drive
+    class(drive_t), allocatable :: drive          !! not allocated if the disks are not driven
+    type(source_t), allocatable :: source(:)      !! sources, in the order of the file; not allocated if there are none
     type(features_t) :: features                  !! optional features
+  contains
+    procedure :: kick_time
+    procedure :: kick_counter
+    procedure :: has_extra
   end type system_t
 
-  !> Values given by the input, which are the same in all domains of a simulation.
+  !> A change of the system at a time known beforehand.
+  type :: change_t
+    real(real64) :: time = never                  !! [time]
+    type(system_t) :: system                      !! system after the change, without the obstacles, which do not change
+    logical :: is_empty = .false.                 !! whether no value changes, so that nothing happens
+    character(len=:), allocatable :: name
+    character(len=:), allocatable :: origin       !! file, line and name of the change, for messages
+    type(text_t), allocatable :: lines(:)         !! GROUP.VARIABLE=VALUE for each changed variable
+  end type change_t
+
+  !> Values given by the input, identical in all domains of a simulation.
   type, extends(system_t) :: specification_t
     type(species_t), allocatable :: species(:)
     integer(int64) :: seed = 1                    !! seed of random numbers drawn during the run
   end type specification_t
 
-  !> A simulation: the values given by the input, and the state that a checkpoint stores.
+  !> A simulation: values given by the input, and the state that a checkpoint stores.
   type, extends(specification_t) :: simulation_t
     type(disk_t), allocatable :: disk(:)          !! (n) disks, sorted by cells; their numbers in the input are in `tag%id`
     type(tag_t), allocatable :: tag(:)            !! (n)
     real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if masses within a species differ [mass]
     type(extra_t), allocatable :: extra(:)        !! (n) optional data, allocated if `has_extra`
-    !> (n) Series of simultaneous collisions, in the order of ids; allocated if disks can collapse.
+    !> (n) Series of simultaneous collisions, in the order of ids; allocated if a collapse is possible.
     type(series_t), allocatable :: series(:)
-    !> (n) Number of times that each disk has been recycled, in the order of ids; allocated if the driving moves disks.
-    integer(int64), allocatable :: recycled(:)
+    !> (n) Number of times that the driving has acted on each disk, in the order of ids; allocated if the driving has a `counter`.
+    integer(int64), allocatable :: drive_count(:)
     real(real64) :: now = 0.0_real64              !! present time, relative to the time origin `box%epoch` [time]
     logical :: events_done = .false.              !! whether all events up to and including the time `now` have been executed
     real(real64) :: epoch_begin = 0.0_real64      !! start of the epoch, relative to the time origin `box%epoch` [time]
     real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, relative to `box%epoch`; 0 if not known yet [time]
     integer(int64) :: epoch_events = 0            !! number of events from the start of the run to the start of the epoch
-    ! The components `negligible_time`, `last_advance` and `events_then` serve to detect that time no longer advances.
+    ! The next three components serve to detect that time no longer advances.
     real(real64) :: negligible_time = 0.0_real64  !! duration in which no disk moves noticeably; 0 if not known yet [time]
     !> Time at which the simulation last advanced by more than `negligible_time`, relative to the time origin `box%epoch` [time]
     real(real64) :: last_advance = 0.0_real64
     integer(int64) :: events_then = 0             !! number of events that had been executed at the time `last_advance`
+    !> (n) Whether each disk waits outside the box, in the order of ids; allocated in open systems. Waiting disks have no events and
+    !> zero velocity.
+    logical, allocatable :: waits(:)
+    !> (sources) Time up to which entries have been made, since the start of the run; allocated together with `waits` [time]
+    real(real64), allocatable :: source_time(:)
     integer(int64) :: kicks = 0                   !! number of kicks since the start of the run
-    integer(int64) :: changes = 0                 !! number of changes by the caller since the start of the run: see `changes`
+    integer(int64) :: changes = 0                 !! number of changes since the start of the run: see `changes`
+    type(change_t), allocatable :: schedule(:)    !! scheduled changes in the order of their times, including those already made
+    integer(int64) :: changes_made = 0            !! number of scheduled changes already made
     type(tally_t) :: tally                        !! counters and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start of the run [energy]
-    !> Kinetic energy when the velocities were last set: at the start of the run, or by a change [energy]
+    !> Kinetic energy when the velocities were last set: at the start of the run or by a change [energy]
     real(real64) :: reference_energy = 0.0_real64
     real(real64) :: typical_speed2 = 0.0_real64   !! largest mean square speed at the start and after changes [(length/time)**2]
   contains
@@ -68,10 +104,12 @@ module simulation_state
     procedure :: has_reached
     procedure :: n_disks
     procedure :: list_disks
-    procedure :: has_extra
     procedure :: has_collapsed
     procedure :: make_room
     procedure :: fit_series
+    procedure :: open_up
+    procedure :: is_inside
+    procedure :: n_inside
     procedure :: whole_disk
     procedure :: place_disk
     procedure :: mass_of
@@ -94,7 +132,148 @@ module simulation_state
     procedure :: fastest_drive
   end type simulation_t
 
+  abstract interface
+
+    !> Reads the variables of a kind of driving from the group `&drive`.
+    subroutine read_drive(self, fields)
+      import :: drive_t, fields_t
+      class(drive_t), intent(inout) :: self
+      class(fields_t), intent(inout) :: fields
+    end subroutine read_drive
+
+    !> Applies kick number `sim%kicks` at the present time, and lists the affected disks.
+    subroutine kick(self, sim, kicked)
+      import :: drive_t, int32, simulation_t
+      class(drive_t), intent(in) :: self
+      type(simulation_t), intent(inout) :: sim
+      integer(int32), allocatable, intent(out) :: kicked(:)
+    end subroutine kick
+
+    !> Mean square of the velocity that a kick sets or adds, for driven disks of a given mass.
+    pure function mean_square(self, mass) result(speed2)
+      import :: drive_t, real64
+      class(drive_t), intent(in) :: self
+      real(real64), intent(in) :: mass            !! [mass]
+      real(real64) :: speed2                      !! [(length/time)**2]
+    end function mean_square
+  end interface
+
+  interface
+    ! The following procedures are in the submodule `typical_speeds`.
+    pure module subroutine start_sums(self)
+      class(simulation_t), intent(inout) :: self
+    end subroutine start_sums
+
+    pure module subroutine choose_units(self)
+      class(simulation_t), intent(inout) :: self
+    end subroutine choose_units
+
+    pure module function fastest_drive(self) result(speed)
+      class(simulation_t), intent(in) :: self
+      real(real64) :: speed
+    end function fastest_drive
+
+    pure module function mean_square_speed(self) result(speed2)
+      class(simulation_t), intent(in) :: self
+      real(real64) :: speed2
+    end function mean_square_speed
+  end interface
+
 contains
+
+  !> Whether the driving acts on a species.
+  elemental function acts_on(self, species) result(yes)
+    class(drive_t), intent(in) :: self
+    integer, intent(in) :: species                !! index of the species
+    logical :: yes
+
+    yes = self%species == 0 .or. self%species == species
+  end function acts_on
+
+  !> Whether each kick changes the velocities of all disks and moves no disk.
+  pure function acts_on_all(self) result(yes)
+    class(drive_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%species == 0
+  end function acts_on_all
+
+  !> Checks whether the driving is compatible with the box and the disks. Problems are attributed to variables of `&drive`.
+  subroutine check(self, fields, box, count, radius)
+    class(drive_t), intent(in) :: self
+    class(fields_t), intent(inout) :: fields
+    type(box_t), intent(in) :: box
+    integer(int32), intent(in) :: count(:)        !! number of disks of each species
+    real(real64), intent(in) :: radius(:)         !! largest radius of each species [length]
+  end subroutine check
+
+  !> Reason why the driving cannot be combined with another setting; empty if it can.
+  pure function conflict(self, setting) result(reason)
+    class(drive_t), intent(in) :: self
+    character(len=*), intent(in) :: setting       !! name of the other variable
+    character(len=:), allocatable :: reason
+
+    reason = ""
+  end function conflict
+
+  !> Completes the initial state of the disks.
+  subroutine prepare(self, sim)
+    class(drive_t), intent(in) :: self
+    type(simulation_t), intent(inout) :: sim
+  end subroutine prepare
+
+  !> Whether driven disks have an orientation even if they do not rotate.
+  pure function orients_disks(self) result(yes)
+    class(drive_t), intent(in) :: self
+    logical :: yes
+
+    yes = .false.
+  end function orients_disks
+
+  !> Whether kicks also move disks to other positions.
+  pure function moves_disks(self) result(yes)
+    class(drive_t), intent(in) :: self
+    logical :: yes
+
+    yes = .false.
+  end function moves_disks
+
+  !> Whether a kick can change the state even after the last possible event.
+  pure function can_act(self, sim) result(yes)
+    class(drive_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = .true.
+  end function can_act
+
+  !> Name of the number stored in `drive_count` for each disk, in frames and observables; empty for driving without such a number.
+  pure function counter(self) result(name)
+    class(drive_t), intent(in) :: self
+    character(len=:), allocatable :: name
+
+    name = ""
+  end function counter
+
+  !> Time of the k-th kick; `never` without driving. It is k times the interval, because repeated addition would accumulate rounding
+  !> errors.
+  pure function kick_time(self, k) result(t)
+    class(system_t), intent(in) :: self
+    integer(int64), intent(in) :: k
+    real(real64) :: t                             !! time since the start of the run [time]
+
+    t = never
+    if (allocated(self%drive)) t = k*self%drive%interval
+  end function kick_time
+
+  !> The `counter` of the driving; empty without driving.
+  pure function kick_counter(self) result(name)
+    class(system_t), intent(in) :: self
+    character(len=:), allocatable :: name
+
+    name = ""
+    if (allocated(self%drive)) name = self%drive%counter()
+  end function kick_counter
 
   !> Time since the start of the run.
   pure function time(self) result(t)
@@ -104,8 +283,7 @@ contains
     t = self%box%epoch + self%now
   end function time
 
-  !> Whether a time has been reached and all events at this time have been executed. A run can stop at a time before all
-  !> simultaneous events have been executed.
+  !> Whether a time has been reached and all events at this time have been executed. A run can stop between simultaneous events.
   pure function has_reached(self, t) result(yes)
     class(simulation_t), intent(in) :: self
     real(real64), intent(in) :: t                 !! time since the start of the run [time]
@@ -122,9 +300,9 @@ contains
     n = size(self%disk, kind=int32)
   end function n_disks
 
-  !> Allocates the disks of all species in the order of the input. The caller later sets masses that differ within a species.
+  !> Allocates the disks of all species in the order of the input. Individual masses are set later by the caller.
   pure subroutine list_disks(self)
-    class(simulation_t), intent(inout) :: self    !! in: simulation with all values given by the input
+    class(simulation_t), intent(inout) :: self    !! on entry, a simulation with all values given by the input
     integer(int32) :: i
 
     call self%make_room(sum(self%species%count))
@@ -138,7 +316,7 @@ contains
 
   !> Whether the disks have the optional data of `extra_t`.
   pure function has_extra(self) result(yes)
-    class(simulation_t), intent(in) :: self
+    class(system_t), intent(in) :: self
     logical :: yes
 
     yes = any(self%box%periodic) .or. self%law%contact_time > 0 .or. self%features%rotation .or. self%features%orientation
@@ -153,11 +331,11 @@ contains
     if (yes) yes = self%tally%collapse <= self%time()
   end function has_collapsed
 
-  !> Allocates the series of simultaneous collisions if disks can collapse, and deallocates them otherwise.
+  !> Allocates the series of simultaneous collisions if a collapse is possible, and deallocates them otherwise.
   pure subroutine fit_series(self)
     class(simulation_t), intent(inout) :: self
 
-    if (self%law%can_collapse() .eqv. allocated(self%series)) return
+    if ((self%law%can_collapse() .or. self%features%collapses) .eqv. allocated(self%series)) return
     if (allocated(self%series)) then
       deallocate (self%series)
     else
@@ -165,9 +343,42 @@ contains
     end if
   end subroutine fit_series
 
+  !> Allocates the data of an open system, with all disks in the box, unless the data already exist.
+  pure subroutine open_up(self)
+    class(simulation_t), intent(inout) :: self
+    integer :: n_sources
+
+    if (.not. self%features%open .or. allocated(self%waits)) return
+    n_sources = 0
+    if (allocated(self%source)) n_sources = size(self%source)
+    allocate (self%waits(self%n_disks()), source=.false.)
+    allocate (self%source_time(n_sources), source=0.0_real64)
+    self%tally%inside = self%species%count
+    allocate (self%tally%entered(n_sources), source=0_int64)
+  end subroutine open_up
+
+  !> Whether disk i is in the box.
+  pure function is_inside(self, i) result(yes)
+    class(simulation_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    logical :: yes
+
+    yes = .true.
+    if (allocated(self%waits)) yes = .not. self%waits(self%tag(i)%id)
+  end function is_inside
+
+  !> Number of disks in the box.
+  pure function n_inside(self) result(n)
+    class(simulation_t), intent(in) :: self
+    integer(int32) :: n
+
+    n = self%n_disks()
+    if (allocated(self%waits)) n = int(sum(self%tally%inside), int32)
+  end function n_inside
+
   !> Allocates the arrays for n disks.
   pure subroutine make_room(self, n, like)
-    class(simulation_t), intent(inout) :: self    !! in: simulation with all values given by the input
+    class(simulation_t), intent(inout) :: self    !! on entry, a simulation with all values given by the input
     integer(int32), intent(in) :: n
     class(simulation_t), intent(in), optional :: like   !! the whole simulation, if `self` is a domain
     logical :: own_masses
@@ -177,8 +388,10 @@ contains
     allocate (self%disk(n), self%tag(n))
     if (self%has_extra()) allocate (self%extra(n))
     if (own_masses) allocate (self%own_mass(n), source=0.0_real64)
-    if (self%drive%moves_disks() .and. .not. present(like)) allocate (self%recycled(n), source=0_int64)
-    if (.not. present(like)) call self%fit_series()
+    if (self%kick_counter() /= "" .and. .not. present(like)) allocate (self%drive_count(n), source=0_int64)
+    if (present(like)) return
+    call self%fit_series()
+    call self%open_up()
   end subroutine make_room
 
   !> All data of disk i.
@@ -193,7 +406,7 @@ contains
     if (allocated(self%extra)) whole%extra = self%extra(i)
   end function whole_disk
 
-  !> Sets all data of disk i to the given data, which are from this simulation or from another domain.
+  !> Sets all data of disk i, which may come from another domain.
   pure subroutine place_disk(self, i, whole)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -227,8 +440,8 @@ contains
     mass = [(self%mass_of(i), i=1, self%n_disks())]
   end function masses
 
-  !> Sets the mass of each species to the largest mass of its disks. The array of individual masses is deallocated if the masses
-  !> are equal within each species.
+  !> Sets the mass of each species to that of its heaviest disk, and deallocates the array of individual masses if the masses are
+  !> equal within each species.
   pure subroutine simplify_masses(self)
     class(simulation_t), intent(inout) :: self
     logical :: equal
@@ -245,7 +458,7 @@ contains
     if (equal) deallocate (self%own_mass)
   end subroutine simplify_masses
 
-  !> Returns the periodic images of the box. Their times are relative to the time origin `box%epoch`.
+  !> Periodic images of the box, for times relative to the time origin `box%epoch`.
   pure function images_now(self) result(images)
     class(simulation_t), intent(in) :: self
     type(images_t) :: images
@@ -253,7 +466,7 @@ contains
     images = self%box%images(self%box%epoch)
   end function images_now
 
-  !> Position of disk i at the present time. The stored state of the disk is not changed.
+  !> Position of disk i at the present time, without changing its stored state.
   pure function position(self, i) result(x)
     class(simulation_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -294,8 +507,8 @@ contains
     self%extra(i)%spin = self%extra(i)%spin + change/self%inertia_of(i)
   end subroutine change_angular_momentum
 
-  !> Advances the orientation of disk i to the time t. `rotate_to` has to be called before `disks: advance_disk`, which changes the
-  !> clock of the disk.
+  !> Advances the orientation of disk i to the time t. Must be called before `disks: advance_disk`, which changes the clock of the
+  !> disk.
   pure subroutine rotate_to(self, i, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -304,13 +517,12 @@ contains
     if (self%features%rotation) self%extra(i)%angle = self%extra(i)%angle + self%extra(i)%spin*(t - self%disk(i)%clock)
   end subroutine rotate_to
 
-  !> Registers a contact of disk i at the time t. `elastic` becomes .true. if the previous contact of the disk has not ended yet (TC
-  !> model).
+  !> Registers a contact of disk i at the time t. `elastic` becomes .true. if its previous contact has not ended yet (TC model).
   pure subroutine register_contact(self, i, t, elastic)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
-    logical, intent(inout) :: elastic             !! in: whether the collision is already known to be elastic
+    logical, intent(inout) :: elastic             !! on entry, whether the collision is already known to be elastic
 
     associate (last => self%extra(i)%last_contact)
       elastic = elastic .or. (self%tag(i)%collisions > 0 .and. t - last < self%law%contact_time)
@@ -318,9 +530,9 @@ contains
     end associate
   end subroutine register_contact
 
-  !> Updates the sums of the flux changes after the velocity of disk i has changed at the time t. The time integral of a flux is the
-  !> present flux times the present time, minus the sum over all changes of the flux, each multiplied by the time of the change. The
-  !> expression for the time integral is exact at any time.
+  !> Updates the sums of the flux changes after a change of the velocity of disk i at the time t. The time integral of a flux is the
+  !> present flux times the present time, minus the sum over all its changes, each multiplied by its time. This expression is exact
+  !> at any time.
   pure subroutine record_velocity_change(self, i, before, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -350,6 +562,7 @@ contains
 
     energy = 0
     do i = 1, self%n_disks()
+      if (.not. self%is_inside(i)) cycle
       v = self%velocity(i)
       energy = energy + 0.5_real64*self%mass_of(i)*dot_product(v, v)
     end do
@@ -359,72 +572,12 @@ contains
     end do
   end function kinetic_energy
 
-  !> Whether disks can gain energy from walls or driving, so that their speeds are not bounded.
+  !> Whether disks can gain unlimited energy, and therefore unlimited speed, from walls or driving.
   pure function is_driven(self) result(yes)
     class(simulation_t), intent(in) :: self
     logical :: yes
 
-    yes = self%box%gives_energy() .or. self%drive%is_on()
+    yes = self%box%gives_energy() .or. allocated(self%drive)
   end function is_driven
-
-  !> Records the initial energy and chooses the units of the sums, unless an earlier call has already done so.
-  pure subroutine start_sums(self)
-    class(simulation_t), intent(inout) :: self
-
-    if (self%tally%sum(1)%per_one > 0 .or. self%n_disks() == 0) return
-    self%start_energy = self%kinetic_energy()
-    self%reference_energy = self%start_energy
-    self%typical_speed2 = self%mean_square_speed()
-    call self%choose_units()
-  end subroutine start_sums
-
-  !> Root mean square speed that kicks produce in the fastest species; 0 if the disks are not driven by kicks.
-  pure function fastest_drive(self) result(speed)
-    class(simulation_t), intent(in) :: self
-    real(real64) :: speed                         !! [length/time]
-    integer :: s
-
-    speed = sqrt(maxval([0.0_real64, self%drive%speed2([(s, s=1, size(self%species))], self%species%mass)]))
-  end function fastest_drive
-
-  !> Mean square speed at the present time, including the surface speed of rotating disks.
-  pure function mean_square_speed(self) result(speed2)
-    class(simulation_t), intent(in) :: self
-    real(real64) :: speed2                        !! [(length/time)**2]
-    integer(int32) :: i
-
-    speed2 = 0
-    do i = 1, self%n_disks()
-      speed2 = speed2 + (sum(self%velocity(i)**2) + (self%spin(i)*self%disk(i)%radius)**2)/self%n_disks()
-    end do
-  end function mean_square_speed
-
-  !> Chooses the units of the sums according to the sizes of typical terms. The size of a typical term is estimated from the mean
-  !> square speed of the disks and from the effects of gravity, walls and kicks. If masses differ widely, each term of the lightest
-  !> disks still has 40 binary digits. Terms of the heaviest disks may exceed the bound of `exact_sum_t`; the addition of such rare
-  !> terms takes slightly longer.
-  pure subroutine choose_units(self)
-    class(simulation_t), intent(inout) :: self
-    real(real64) :: mass(size(self%disk)), kicked(size(self%species))    ! [mass, (length/time)**2]
-    real(real64) :: speed2, light, heavy, small, large, length
-    integer :: s
-
-    mass = self%masses()
-    light = minval(mass)
-    heavy = maxval(mass)
-    small = 2*minval(self%disk%radius)
-    large = 2*maxval(self%disk%radius)
-    length = maxval(self%box%edges())
-    kicked = self%drive%speed2([(s, s=1, size(kicked))], self%species%mass)
-    speed2 = self%typical_speed2 + sum(abs(self%box%gravity)*self%box%edges()) + self%box%highest_temperature()/light &
-      + self%box%highest_speed()**2 + maxval(kicked)
-    call self%tally%make_room(size(self%box%surface))
-    call self%tally%choose_units(merge(finer, 1.0_real64, self%is_driven())*[ &
-      min(common*heavy, rare*light)*speed2, &
-      min(common*heavy, rare*light)*sqrt(speed2), &
-      min(common*heavy*large, rare*light*small)*sqrt(speed2), &
-      min(common*heavy*length, rare*light*small)*speed2, &
-      min(common*heavy*length, rare*light*small)*sqrt(speed2)])
-  end subroutine choose_units
 
 end module simulation_state

@@ -1,6 +1,6 @@
-!> Stores the disks in each cell. A cell has three slots (array elements, each for the index of one disk) and a count. The slots and
-!> the count occupy 16 bytes, which are copied as a unit. A cell with more than three disks is called crowded: its additional disks
-!> form a linked list that starts in the last slot.
+!> Contents of the cells. A cell is a record of 16 bytes, copied as a unit: a count and three slots,
+!> each for the index of one disk. In a crowded cell, one with more than three disks, the additional
+!> disks form a linked list that starts in the last slot.
 module cell_contents
   use kinds, only: int16, int32, int64
   use disks, only: disk_t, tag_t
@@ -12,13 +12,15 @@ module cell_contents
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
-  integer(int32), parameter :: counted = 65535               !! bit mask of the number of disks in the slots
+  integer(int32), parameter :: counted = 65535               !! bit mask for the number of disks in the slots
   integer(int32), parameter :: crowd = counted + 1           !! increment of the bit field that counts crowded cells
-  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit that contains the mark of the cell
+  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit that marks the cell
 
-  !> The array `slot` of a cell contains the slots and, as its last element, bit fields. A slot contains the index of a disk,
-  !> counted from 0. In the last element of `slot`, bits 0 to 15 contain the number of disks in the slots. Bits 16 to 23 contain the
-  !> number of crowded cells among the cell and its eight neighbours. Bit 24 is the mark of the cell: see `cell_grid: mark`.
+  !> The array `slot` holds three indices of disks, counted from 0, and, as its last element, bit
+  !> fields:
+  !> - bits 0 to 15: number of disks in the slots,
+  !> - bits 16 to 23: number of crowded cells among the cell and its eight neighbours,
+  !> - bit 24: mark of the cell (see `cell_grid: mark`).
   type :: cell_t
     integer(int32) :: slot(count_slot)
   contains
@@ -45,7 +47,7 @@ module cell_contents
 
 contains
 
-  !> Number of the cell in column cell(1) and row cell(2). Columns and rows are counted from 1.
+  !> Number of the cell in column cell(1) and row cell(2), both counted from 1.
   pure function number(self, cell) result(c)
     class(cell_contents_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -54,7 +56,7 @@ contains
     c = cell(1) + self%stride*cell(2)
   end function number
 
-  !> Allocates `rows` rows of `stride` empty cells for n_disks disks.
+  !> Allocates `rows` rows of `stride` empty cells, for n_disks disks.
   subroutine empty(self, stride, rows, n_disks)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: stride, rows, n_disks
@@ -151,8 +153,8 @@ contains
     if (self%chain(c) == 0) call self%count_crowd(c, -1)
   end subroutine remove
 
-  !> Updates the counts of crowded cells in cell c and its eight neighbours. `change` is 1 if cell c becomes crowded, and -1 if cell
-  !> c is no longer crowded.
+  !> Updates the counts of crowded cells in cell c and its eight neighbours: `change` is 1 if cell c
+  !> has become crowded, and -1 if it no longer is.
   pure subroutine count_crowd(self, c, change)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c, change
@@ -173,8 +175,8 @@ contains
     n = iand(self%slot(count_slot), counted)
   end function in_slots
 
-  !> Whether predictions for disks in a cell need the general procedure: the cell is marked, or the cell or one of its eight
-  !> neighbours is crowded.
+  !> True if predictions for disks in a cell need the general procedure, because the cell is marked,
+  !> or because the cell or one of its eight neighbours is crowded.
   elemental function needs_care(self) result(yes)
     class(cell_t), intent(in) :: self
     logical :: yes
@@ -182,7 +184,7 @@ contains
     yes = self%slot(count_slot) >= crowd
   end function needs_care
 
-  !> Whether cell c or any of its eight neighbours is crowded.
+  !> True if cell c or any of its eight neighbours is crowded.
   pure function is_crowded_around(self, c) result(yes)
     class(cell_contents_t), intent(in) :: self
     integer(int32), intent(in) :: c
@@ -191,8 +193,8 @@ contains
     yes = iand(self%cell(c)%slot(count_slot), marked - crowd) > 0
   end function is_crowded_around
 
-  !> First disk in the linked list of cell c; 0 if the cell is not crowded. The first disk of the linked list also occupies the last
-  !> slot of the cell.
+  !> First disk in the linked list of cell c, which also occupies the last slot; 0 if the cell is
+  !> not crowded.
   pure function chain(self, c) result(i)
     class(cell_contents_t), intent(in) :: self
     integer(int32), intent(in) :: c
@@ -204,7 +206,7 @@ contains
     if (self%next(i) == 0) i = 0
   end function chain
 
-  !> Number of slots before the slot of disk i in its cell; 2 if disk i is in the linked list of the cell.
+  !> Number of slots before that of disk i in its cell; 2 if the disk is in the linked list.
   elemental function slots_before(self, i) result(n)
     type(cell_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -214,9 +216,10 @@ contains
     n = first + iand(first, merge(0, 1, self%slot(2) == i - 1))
   end function slots_before
 
-  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i, which is in cell c. All slots of a cell are
-  !> copied, whether occupied or vacant, so that no branch depends on the numbers of disks. If disk i is in the linked list of a
-  !> crowded cell and not in a slot, the procedure omits the head of the linked list instead of disk i.
+  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i itself, which is
+  !> in cell c. All slots are copied, whether occupied or vacant, to avoid branches that depend on
+  !> the numbers of disks. If disk i is in the linked list of a crowded cell instead of a slot, the
+  !> head of that list is left out in its place.
   subroutine gather(cell, c, stride, i, list, n)
     type(cell_t), intent(in) :: cell(0:*)
     integer(int32), intent(in) :: c, stride, i
@@ -253,9 +256,9 @@ contains
     n = n + cell%in_slots()
   end subroutine append
 
-  !> Prefetches the data that are needed to predict the events of some disks. Prefetching has three stages: first the records of the
-  !> given disks, then their cells, and finally the disks in the cells. The data for the collision partner of a disk are prefetched
-  !> one stage later than the data for the disk.
+  !> Prefetches the data needed to predict the next events of several disks, in three stages: the
+  !> records of the disks, their cells, and the disks in these cells. The collision partner of a
+  !> disk is one call behind in each stage.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_contents_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -280,7 +283,6 @@ contains
     end do
   contains
 
-    !> Prefetches the record and tag of a disk.
     subroutine fetch(i)
       integer(int32), intent(in) :: i
 

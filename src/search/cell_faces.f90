@@ -1,9 +1,8 @@
-!> The faces of the cells, and the times when disks leave their cells. The sides of the box are also faces of cells.
+!> Faces of the cells, including the sides of the box, and the times at which disks cross them.
 !>
-!> Neighbouring cells overlap, so that a disk in the overlap can be assigned to either cell. The width of the overlap is the largest
-!> width for which two disks in cells that are not adjacent cannot touch each other. A disk in the overlap of two cells is assigned
-!> to the cell that the disk leaves last. If cells are much wider than disks, the overlap halves the number of events in which disks
-!> cross faces.
+!> Neighbouring cells overlap. The overlap is the largest for which two disks in contact are always in the same cell or in adjacent
+!> cells. A disk in an overlap is assigned to the cell that it will leave last. With cells much wider than disks, this halves the
+!> number of cell crossings.
 module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t
@@ -13,25 +12,23 @@ module cell_faces
   use neighbour_search, only: prediction_t
   use partners, only: crossing, is_wall, n_sides, nothing, sense_of, side_crossed
   use shapes, only: spare
-  use side_motion, only: piston
   implicit none
   private
   public :: all_cells, cell_faces_t, line_t, patch_t
 
-  !> A patch: a rectangular block of cells. A patch usually consists of all cells into which the box is divided. In a parallel run
-  !> the patch of a domain consists of a part of the cells of the box, and may extend across a periodic side. An outer face of a
-  !> patch that is not a side of the box is open: a disk that crosses an open face leaves the patch.
+  !> A rectangular block of cells: usually all cells of the box; in a parallel run, those of a domain and its halo, possibly across
+  !> a periodic side. A disk that crosses an outer face leaves the block, unless the face is a side of the box.
   type :: patch_t
     integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the whole box
-    !> First column and row of the patch. The values are less than 1 if the patch begins beyond a periodic side of the box.
+    !> First column and row of the block; below 1 if the block begins beyond a periodic side of the box.
     integer(int32) :: first(2) = 1
-    integer(int32) :: n(2) = 0                     !! numbers of columns and rows in the patch
-    real(real64) :: small = 0.0_real64             !! radius of the largest disks for which the cells are wide enough [length]
+    integer(int32) :: n(2) = 0                     !! numbers of columns and rows in the block
+    real(real64) :: small = 0.0_real64             !! largest radius for which the cells are wide enough [length]
     real(real64) :: reach = 0.0_real64             !! largest distance between the centres of two disks in contact [length]
     real(real64) :: lower(2) = 0.0_real64          !! lower left corner of the box [length]
     real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
-    ! If a periodic side of the box is inside the patch, `last` is the last column or row before the side, and `next` is the first
-    ! column or row behind the side. If the patch contains no periodic side along an axis, `last` and `next` are 0 for the axis.
+    ! If a periodic side lies inside the block, `last` is the column or row just before it and `next` the one just behind it. Both
+    ! are 0 along an axis without such a side.
     integer(int32) :: last(2) = 0
     integer(int32) :: next(2) = 0
   contains
@@ -45,13 +42,13 @@ module cell_faces
     procedure :: equals
   end type patch_t
 
-  !> A line that limits a cell, parallel to an axis: a face of a column or row of cells, or a side of the box.
+  !> A line parallel to an axis that bounds a cell: a face of a column or row of cells, or a side of the box.
   type :: line_t
     real(real64) :: place = 0.0_real64             !! position of the face or side [length]
-    !> Signed distance from the line to the centre of a disk at the event, divided by the radius of the disk. The value is 1 for a
-    !> left or bottom wall, -1 for a right or top wall, and 0 for a face or a periodic side.
+    !> Signed distance of the disk's centre from the line at the event, in units of its radius: 1 for a left or bottom wall, -1 for
+    !> a right or top wall, 0 for a face and for a periodic or open side.
     real(real64) :: inset = 0.0_real64
-    integer(int32) :: code = 0                     !! code of the event: contact with a side, or crossing of a face
+    integer(int32) :: code = 0                     !! code of the event: contact with a side, or cell crossing
     logical :: struck = .false.                    !! whether a moving side may touch disks in this cell
   end type line_t
 
@@ -59,14 +56,17 @@ module cell_faces
     real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
     real(real64) :: overlap(2) = 0.0_real64        !! width of the overlap of neighbouring cells [length]
     logical :: moving = .false.                    !! whether the box has moving sides
-    logical :: falling = .false.                   !! whether gravity acts or sides move, so that two faces are tested along an axis
-    logical :: periodic(2) = .false.               !! periodic boundary along each axis
-    ! A piston can reach any part of the box in the course of time. Before the piston has moved by the width of a cell, the piston
-    ! can touch only disks in a strip of adjacent columns or rows of cells.
-    real(real64) :: due = never                    !! time when the first piston leaves its strip, relative to `box%epoch` [time]
+    !> whether gravity acts or sides move, so that both faces of an axis must be tested
+    logical :: falling = .false.
+    logical :: periodic(2) = .false.               !! whether the box is periodic along each axis
+    ! A piston can eventually reach any part of the box, but until it has moved by one cell width, it can touch only disks in a
+    ! strip: a few adjacent columns or rows. `due` is the earliest time at which any piston leaves its strip, relative to
+    ! `box%epoch` [time]
+    real(real64) :: due = never
     !> Centre of the strip of each piston, as an inward displacement from the mean position of the side [length]
     real(real64) :: centre(n_sides) = 0.0_real64
-    !> (axis, 1: lower side, 2: upper side) Largest distance by which disks can be beyond the mean position of each side [length]
+    !> (axis, 1: lower side, 2: upper side) largest distance of a disk beyond the mean position of
+    !> each side [length]
     real(real64) :: beyond(2, 2) = 0.0_real64
     type(line_t), allocatable :: column(:, :)      !! (0:1,columns) left and right faces
     type(line_t), allocatable :: row(:, :)         !! (0:1,rows) lower and upper faces
@@ -83,7 +83,7 @@ module cell_faces
 
 contains
 
-  !> The patch of all cells of a box that is divided into n(1) columns and n(2) rows.
+  !> The block of all cells of a box that is divided into n(1) columns and n(2) rows.
   pure function all_cells(box, n, reach) result(patch)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: n(2)
@@ -94,12 +94,12 @@ contains
     patch%n = n
     patch%reach = reach
     patch%lower = box%lower
-    ! The width of a cell is slightly increased, so that rounding errors cannot place the last face inside the box.
+    ! The last face must not fall inside the box because of rounding errors, so the cells are made slightly wider.
     patch%width = box%edges()/n*(1 + 4*epsilon(reach))
     call patch%find_sides(box%periodic)
   end function all_cells
 
-  !> Finds the cells at periodic sides inside the patch.
+  !> Finds the columns and rows beside periodic sides inside the block.
   pure subroutine find_sides(self, periodic)
     class(patch_t), intent(inout) :: self
     logical, intent(in) :: periodic(2)
@@ -112,8 +112,7 @@ contains
     end where
   end subroutine find_sides
 
-  !> The column and row of the cell in the patch that contains a point of the box. If the point is outside the patch, the result
-  !> exceeds `n`.
+  !> Column and row of the block that contain a point of the box; beyond `n` if the point is outside the block.
   pure function cell_at(self, x) result(cell)
     class(patch_t), intent(in) :: self
     real(real64), intent(in) :: x(2)               !! [length]
@@ -123,7 +122,7 @@ contains
     if (self%first(1) /= 1 .or. self%first(2) /= 1) cell = modulo(cell - self%first, self%whole) + 1
   end function cell_at
 
-  !> Converts a column or row of the patch to a column or row of the whole grid.
+  !> Converts the number of a column or row, counted within the block, to its number in the grid of the whole box.
   elemental function place_of(self, cell, axis) result(place)
     class(patch_t), intent(in) :: self
     integer(int32), intent(in) :: cell
@@ -133,7 +132,7 @@ contains
     place = modulo(self%first(axis) + cell - 2, self%whole(axis)) + 1
   end function place_of
 
-  !> Whether a cell is inside the patch.
+  !> True if a cell belongs to the block.
   pure function holds(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -142,7 +141,7 @@ contains
     yes = all(cell >= 1 .and. cell <= self%n)
   end function holds
 
-  !> Whether the patch contains each of the given cells. The columns and rows of the given cells refer to the whole grid.
+  !> True if all given cells, numbered as in the whole grid, belong to the block.
   pure function covers(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(:, :)       !! (2,n)
@@ -152,7 +151,7 @@ contains
       .and. modulo(cell(2, :) - self%first(2), self%whole(2)) < self%n(2)
   end function covers
 
-  !> Whether any of the eight neighbours of a cell is beyond a periodic side.
+  !> True if any of the eight neighbours of a cell is beyond a periodic side.
   pure function at_seam(self, cell) result(yes)
     class(patch_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -161,8 +160,7 @@ contains
     yes = any(cell == self%last .or. cell == self%next)
   end function at_seam
 
-  !> Finds the column or row that is `ahead` steps away from a given column or row, and the number of periodic sides that these
-  !> steps cross.
+  !> Finds the column or row `ahead` steps from a given one, and the number of periodic sides in between.
   pure subroutine step(self, axis, cell, ahead, there, periods)
     class(patch_t), intent(in) :: self
     integer, intent(in) :: axis
@@ -173,7 +171,7 @@ contains
     periods = 0
     associate (last => self%last(axis), n => self%n(axis))
       if (last == 0) return
-      if (last < n) periods = merge(1, 0, there > last) - merge(1, 0, cell > last)      ! the periodic side is inside the patch
+      if (last < n) periods = merge(1, 0, there > last) - merge(1, 0, cell > last)      ! the periodic side is inside the block
       if (last < n) return
       do while (there > n)
         there = there - n
@@ -186,7 +184,7 @@ contains
     end associate
   end subroutine step
 
-  !> Whether two patches consist of the same cells, and the cells were chosen for disks of the same sizes.
+  !> True if two blocks consist of the same cells, chosen for disks of the same sizes.
   pure function equals(self, other) result(yes)
     class(patch_t), intent(in) :: self
     type(patch_t), intent(in) :: other
@@ -197,7 +195,7 @@ contains
       .and. all(abs(self%lower - other%lower) <= 0) .and. all(abs(self%width - other%width) <= 0)
   end function equals
 
-  !> Sets up the faces of the cells of a patch.
+  !> Sets up the faces of the cells of a block.
   subroutine set(self, box, patch, now)
     class(cell_faces_t), intent(out) :: self
     type(box_t), intent(in) :: box
@@ -206,11 +204,11 @@ contains
 
     self%width = patch%width
     self%overlap = max(self%width - patch%reach, 0.0_real64)
-    self%moving = any(box%surface(:n_sides)%motion%moves())
+    self%moving = any(box%side%moves())
     self%falling = box%has_gravity() .or. self%moving
     self%periodic = box%periodic
     self%beyond = box%side_excursion()
-    where (transpose(reshape(box%surface(:n_sides)%motion%kind == piston, [2, 2]))) self%beyond = never
+    where (transpose(reshape(box%side%is_piston(), [2, 2]))) self%beyond = never
     call cut(1, self%column)
     call cut(2, self%row)
     call find_struck(1, self%column)
@@ -222,11 +220,11 @@ contains
     pure subroutine cut(axis, line)
       integer(int32), intent(in) :: axis
       type(line_t), allocatable, intent(out) :: line(:, :)
-      integer(int32) :: low, high, inset, k, place
+      integer(int32) :: low, high, inset(2), k, place
 
       low = 2 - 2*axis                               ! codes of the two sides
       high = low - 1
-      inset = merge(0, 1, box%periodic(axis))
+      inset = merge(0, 1, box%periodic(axis) .or. box%open([1 - low, 1 - high]))
       allocate (line(0:1, patch%n(axis)))
       do k = 1, patch%n(axis)
         place = patch%place_of(k, axis)
@@ -234,8 +232,8 @@ contains
           0.0_real64, crossing(low))
         line(1, k) = line_t(box%lower(axis) + self%width(axis)*place + 0.5_real64*self%overlap(axis), &
           0.0_real64, crossing(high))
-        if (place == 1) line(0, k) = line_t(box%lower(axis), inset, low)
-        if (place == patch%whole(axis)) line(1, k) = line_t(box%upper(axis), -inset, high)
+        if (place == 1) line(0, k) = line_t(box%lower(axis), inset(1), low)
+        if (place == patch%whole(axis)) line(1, k) = line_t(box%upper(axis), -inset(2), high)
       end do
     end subroutine cut
 
@@ -244,18 +242,19 @@ contains
       integer, intent(in) :: axis
       type(line_t), intent(inout) :: line(0:, :)
       real(real64) :: reach(2, 2)
+      logical :: moves(n_sides)
 
       reach = box%side_excursion()
-      associate (side => box%surface(2*axis - 1:2*axis)%motion, within => (reach(axis, :) + patch%small)*(1 + spare))
-        line(0, :)%struck = side(1)%moves() .and. line(0, :)%place <= box%lower(axis) + within(1)
-        line(1, :)%struck = side(2)%moves() .and. line(1, :)%place >= box%upper(axis) - within(2)
+      moves = box%side%moves()
+      associate (within => (reach(axis, :) + patch%small)*(1 + spare))
+        line(0, :)%struck = moves(2*axis - 1) .and. line(0, :)%place <= box%lower(axis) + within(1)
+        line(1, :)%struck = moves(2*axis) .and. line(1, :)%place >= box%upper(axis) - within(2)
       end associate
     end subroutine find_struck
   end subroutine set
 
-  !> Finds the columns and rows in which a piston may touch disks before the piston has moved by the width of a cell. A disk outside
-  !> of all cells is assigned to an outermost cell. A piston outside of all cells, beyond its own or the opposite side of the box,
-  !> can therefore touch disks that are assigned to the outermost cells.
+  !> Finds the columns and rows in which a piston may touch disks before it has moved by the width of a cell. The outermost cells
+  !> also hold the disks beyond the grid, and are therefore within reach of a piston that has moved out of the grid on either side.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -264,7 +263,7 @@ contains
     integer :: k
 
     do k = 1, n_sides
-      if (box%surface(k)%motion%kind /= piston) cycle
+      if (.not. box%side(k)%is_piston()) cycle
       self%centre(k) = max(box%side_position(k, now), 0.0_real64)
       if (k <= 2) call mark(self%column, 1)
       if (k > 2) call mark(self%row, 2)
@@ -272,7 +271,7 @@ contains
     call self%watch_pistons(box, now)
   contains
 
-    !> Marks the columns (axis 1) or rows (axis 2) that belong to the strip of a piston.
+    !> Marks the columns (axis 1) or rows (axis 2) in the strip of a piston.
     pure subroutine mark(line, axis)
       type(line_t), intent(inout) :: line(0:, :)
       integer, intent(in) :: axis
@@ -287,30 +286,30 @@ contains
     end subroutine mark
   end subroutine find_strips
 
-  !> Finds the earliest time at which any piston leaves its strip. The strip of a piston consists of the columns or rows in which
-  !> the piston may touch disks. The result is valid until a disk collides with a piston.
+  !> Finds the earliest time at which any piston leaves its strip of columns or rows. The result is valid until a disk collides with
+  !> a piston.
   pure subroutine watch_pistons(self, box, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: now
-    real(real64) :: ahead, v
+    real(real64) :: ahead, outwards
     integer :: k
 
     self%due = never
     do k = 1, n_sides
-      associate (motion => box%surface(k)%motion, width => self%width((k + 1)/2))
-        if (motion%kind /= piston) cycle
+      if (.not. box%side(k)%is_piston()) cycle
+      associate (width => self%width((k + 1)/2))
         ahead = box%side_position(k, now) - self%centre(k)
-        v = box%side_velocity(k, now)
-        self%due = min(self%due, now + time_to_line(max(width - ahead, 0.0_real64), v, motion%pull))
-        if (self%centre(k) > width) &
-          self%due = min(self%due, now + time_to_line(max(width + ahead, 0.0_real64), -v, -motion%pull))
+        outwards = never
+        if (self%centre(k) > width) outwards = max(width + ahead, 0.0_real64)
+        self%due = min(self%due, now + box%side(k)%motion%leaving_time(box%side_velocity(k, now), &
+          max(width - ahead, 0.0_real64), outwards))
       end associate
     end do
   end subroutine watch_pistons
 
-  !> The rectangle that contains the centres of the disks in a cell. A cell at a side of the box extends to the outermost position
-  !> that the side can reach. If the side is a piston, the cell is unbounded towards the piston.
+  !> Rectangle that contains the centres of all disks in a cell. For a cell at a side of the box, it extends to the outermost
+  !> position of that side; towards a piston it is unbounded.
   pure subroutine rectangle(self, cell, n, low, high)
     class(cell_faces_t), intent(in) :: self
     integer(int32), intent(in) :: cell(2)          !! column and row in the grid of the whole box
@@ -321,7 +320,7 @@ contains
     high = self%width*cell + 0.5_real64*self%overlap + merge(self%beyond(:, 2), 0.0_real64, cell == n)
   end subroutine rectangle
 
-  !> Among the overlapping cells that contain the disk, chooses the cell that the disk leaves last.
+  !> Chooses, among the overlapping cells that contain the disk, the one that it will leave last.
   pure subroutine choose_cell(self, gravity, disk, now, cell)
     class(cell_faces_t), intent(in) :: self
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
@@ -335,8 +334,8 @@ contains
     cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), gravity(2), s, cell(2))
   end subroutine choose_cell
 
-  !> Change of the column or row of a disk along one axis: 1 or -1 if the next cell in the direction of motion also contains the
-  !> disk, otherwise 0.
+  !> Change of a disk's column or row along one axis: 1 or -1 if the next cell in its direction of motion also contains the disk,
+  !> otherwise 0.
   pure function ahead(line, overlap, x, v, g, s, cell) result(step)
     type(line_t), intent(in) :: line(0:1, *)
     real(real64), intent(in) :: overlap, x, v, g, s
@@ -350,8 +349,7 @@ contains
     step = int(chosen(0_int32, 2*up - 1, left < overlap .and. .not. is_wall(line(up, cell)%code)), int16)
   end function ahead
 
-  !> `second` if the condition holds, otherwise `first`. The function has no branch, because a processor cannot predict the
-  !> condition.
+  !> Returns `second` if the condition holds and `first` otherwise, without a branch, which would often be mispredicted.
   elemental function chosen(first, second, condition) result(n)
     integer(int32), intent(in) :: first, second
     logical, intent(in) :: condition
@@ -360,7 +358,7 @@ contains
     n = ieor(first, iand(-merge(1, 0, condition), ieor(first, second)))
   end function chosen
 
-  !> Finds the earliest event at which the disk leaves its cell or touches a side that is within the cell.
+  !> Finds the earliest event at which the disk leaves its cell or touches a side within it.
   pure subroutine next(self, box, disk, cell, now, falling, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -377,8 +375,8 @@ contains
     end if
   end subroutine next
 
-  !> Finds the earliest event at which the disk reaches one of four given lines around its position. The lines may be closer to the
-  !> disk than the faces of its cell, for example if the lines limit its neighbourhood.
+  !> Finds the earliest event at which the disk reaches one of four given lines around it: the faces of its cell, or closer lines
+  !> that bound its neighbourhood.
   pure subroutine next_within(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -394,8 +392,8 @@ contains
     end if
   end subroutine next_within
 
-  !> Version of `next_within` for disks on straight paths. The axis and the direction are selected without branches, because a
-  !> processor cannot predict such branches.
+  !> Version of `next_within` for disks on straight paths. Axis and direction are selected without
+  !> branches, which would often be mispredicted.
   pure subroutine next_straight(column, row, disk, cell, t, code)
     type(line_t), intent(in) :: column(0:1, *), row(0:1, *)
     type(disk_t), intent(in) :: disk
@@ -413,8 +411,8 @@ contains
     t = merge(t_y, t_x, t_y < t_x)
   end subroutine next_straight
 
-  !> Time when a disk on a straight path reaches a line that the disk approaches along an axis. For a side the result is
-  !> bit-identical to the result of `side_time`, because the event must not depend on the procedure that predicts it.
+  !> Time at which a disk on a straight path reaches a line ahead of it along one axis. If the line is a side, the time is
+  !> bit-identical to that of `side_time`: the result must not depend on the procedure that predicts a collision.
   pure function line_time(line, disk, axis) result(t)
     type(line_t), intent(in) :: line
     type(disk_t), intent(in) :: disk
@@ -532,8 +530,8 @@ contains
     end do
   end subroutine next_moving
 
-  !> Time when a disk on a parabolic path reaches a face or side. The equation of motion has two roots; the earlier root, at which
-  !> the disk entered the cell, is excluded.
+  !> Time at which a disk on a parabolic path reaches a face or side. The earlier root of the equation of motion, at which the disk
+  !> entered the cell, is excluded.
   pure function falling_time(line, axis, box, disk, now) result(t)
     type(line_t), intent(in) :: line
     integer(int32), intent(in) :: axis
@@ -554,8 +552,8 @@ contains
     t = max(now, disk%clock + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*g))
   end function falling_time
 
-  !> Smallest time difference that is resolved at the time `now`. Without a smallest time difference, a disk that reverses its
-  !> motion at a face could cross the face infinitely often.
+  !> Smallest time difference resolved at the time `now`; without this limit, a disk turning round at a face could cross it
+  !> infinitely often.
   elemental function resolution(now)
     real(real64), intent(in) :: now
     real(real64) :: resolution

@@ -1,5 +1,5 @@
-!> Cell search (linked-cell method) with cells at least one diameter wide. A disk can touch only disks in its cell and in the eight
-!> neighbouring cells before the disk leaves its cell, which is an event. Wide cells overlap (see `cell_faces`).
+!> Cell search (linked-cell method). Cells are at least one diameter wide, so that a disk can touch only disks in the 3 x 3 cells
+!> around it until it leaves its own cell, which is an event. Wide cells overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, next_obstacle
@@ -26,16 +26,16 @@ module cell_grid
     private
     type(patch_t), public :: patch                 !! block of cells; chosen by `build`, unless the search belongs to a domain
     logical, public :: is_part = .false.
-    logical, public :: undivided = .false.         !! whether the box is a single cell, so that all pairs are tested
-    logical, public :: everyone = .false.          !! whether each event is followed by predictions for all disks
+    logical, public :: undivided = .false.         !! whether the box is a single cell, in which all pairs are tested
+    logical, public :: everyone = .false.          !! whether each event requires new predictions for all disks
     type(cell_faces_t), public :: faces                    !! faces of the cells, and sides
-    logical, public :: roomy = .false.             !! whether cells overlap, so that a disk can change its cell in a collision
-    type(cell_contents_t), public :: cells                 !! disks in each cell; a ring of empty cells surrounds the patch
+    logical, public :: roomy = .false.             !! whether cells overlap, so that a collision can reassign a disk to another cell
+    type(cell_contents_t), public :: cells                 !! disks in each cell, including a border of empty cells around the block
     type(object_lists_t), public :: reach           !! obstacles, and disks that are too large for the width of the cells
     type(images_t) :: images                       !! periodic images of the box
-    integer(int32) :: n_listed = 0                 !! number of disks inserted into cells
+    integer(int32), public :: n_listed = 0         !! number of disks inserted into cells
     type(neighbour_lists_t), public :: lists       !! neighbour lists of the small disks, used if cells contain many disks
-    real(real64) :: plain_radius = 0.0_real64  !! largest radius for which a crossing of a disk changes no list, or -1 [length]
+    real(real64) :: plain_radius = 0.0_real64  !! largest radius of disks that cross cells without changing a list, or -1 [length]
   contains
     procedure :: build
     procedure :: predict
@@ -53,7 +53,7 @@ module cell_grid
 
 contains
 
-  !> Chooses the cells, and lists the disks in each cell and, unless the cells are unchanged, the obstacles in each cell.
+  !> Chooses the cells and assigns all disks to them. The lists of obstacles are renewed only if the cells have changed.
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -95,7 +95,7 @@ contains
     end associate
   end subroutine build
 
-  !> Removes all disks from the cells that are stored in the tags of the disks. `all_found` is .true. if all cells become empty.
+  !> Removes all disks from the cells stored in their tags. `all_found` tells whether all cells are then empty.
   subroutine clear_cells(self, sim, all_found)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -122,6 +122,7 @@ contains
     self%n_listed = 0
     associate (patch => self%patch)
       do i = 1, sim%n_disks()
+        if (.not. sim%is_inside(i)) cycle
         if (sim%disk(i)%radius > patch%small) then
           sim%tag(i)%cell = 1                      ! cell (1,1), which is always marked
         else if (sim%tag(i)%id > 0) then
@@ -133,7 +134,7 @@ contains
     end associate
   end subroutine fill_cells
 
-  !> Sets up the neighbour lists of all small disks, if the search is expected to be faster with neighbour lists.
+  !> Sets up the neighbour lists of all small disks, if they are expected to save time.
   subroutine list_all(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -144,7 +145,7 @@ contains
     call self%lists%prepare(sim%disk, sim%tag, sim%box%lower, sim%box%edges(), self%patch)
     if (.not. self%lists%used) return
     do i = 1, sim%n_disks()
-      if (sim%tag(i)%id > 0 .and. sim%disk(i)%radius <= self%patch%small) call self%list(sim, i)
+      if (sim%tag(i)%id > 0 .and. sim%disk(i)%radius <= self%patch%small .and. sim%is_inside(i)) call self%list(sim, i)
     end do
   end subroutine list_all
 
@@ -169,7 +170,7 @@ contains
     call take(self, tag, i)
   end subroutine take_out
 
-  !> Inserts disk i into a cell and leaves the neighbour lists unchanged.
+  !> Inserts disk i into a cell without touching the neighbour lists.
   subroutine put(self, tag, i, cell)
     class(cell_grid_t), intent(inout) :: self
     type(tag_t), intent(inout) :: tag
@@ -180,7 +181,7 @@ contains
     call self%cells%insert(self%cells%number(cell), i)
   end subroutine put
 
-  !> Removes disk i from its cell and leaves the neighbour lists unchanged.
+  !> Removes disk i from its cell without touching the neighbour lists.
   subroutine take(self, tag, i)
     class(cell_grid_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag
@@ -189,7 +190,7 @@ contains
     call self%cells%remove(self%cells%number(tag%cell), i)
   end subroutine take
 
-  !> Sets up the neighbour list of disk i at its present position, unless disk i has left the patch.
+  !> Sets up the neighbour list of disk i at its present position, unless the disk has left the block of cells.
   subroutine list(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -200,7 +201,7 @@ contains
     call self%lists%enter(i, self%cells, self%patch, sim%tag(i)%cell)
   end subroutine list
 
-  !> Marks a cell whose disks need the general procedure: they may touch obstacles, big disks or periodic images, or are big.
+  !> Marks a cell whose disks need the general procedure, because they are big or may touch obstacles, big disks or periodic images.
   subroutine mark(self, cell)
     class(cell_grid_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -211,7 +212,7 @@ contains
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
-  !> Updates the reference position of a big disk, and the marks of the cells that the disk leaves and reaches.
+  !> Updates the reference position of a big disk, and the marks of the cells that it leaves and reaches.
   subroutine follow_big(self, sim, number)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -227,7 +228,7 @@ contains
     end do
   end subroutine follow_big
 
-  !> Executes a crossing of disk i: changes its cell, neighbour list or reference position, and predicts its next event.
+  !> Executes a cell crossing of disk i (or the expiry of its list or reference position), and predicts its next event.
   subroutine cross(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -241,7 +242,7 @@ contains
     call self%predict(sim, i)
   end subroutine cross
 
-  !> Updates the reference position of a big disk, or renews the neighbour list of a small disk.
+  !> Updates the reference position of a big disk, or renews the neighbour list of a small one.
   subroutine cross_with_care(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -256,7 +257,7 @@ contains
     end if
   end subroutine cross_with_care
 
-  !> Moves disk i into the cell beyond a face. If the face is a periodic side, the new cell is the first cell behind the side.
+  !> Moves disk i to the cell behind a face, or to the first cell of the periodic image if the face is a periodic side.
   subroutine change_cell(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -280,7 +281,7 @@ contains
     call move(self, sim%tag(i), i, cell)
   end subroutine change_cell
 
-  !> After a collision of disk i, chooses its cell again if cells overlap.
+  !> If the cells overlap, reassigns disk i to a cell after a collision.
   subroutine choose_cell(self, gravity, disk, tag, i)
     class(cell_grid_t), intent(inout) :: self
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
@@ -295,7 +296,6 @@ contains
     if (cell(1) /= tag%cell(1) .or. cell(2) /= tag%cell(2)) call move(self, tag, i, cell)
   end subroutine choose_cell
 
-  !> Moves disk i into another cell.
   subroutine move(self, tag, i, cell)
     class(cell_grid_t), intent(inout) :: self
     type(tag_t), intent(inout) :: tag
@@ -306,7 +306,7 @@ contains
     call put(self, tag, i, cell)
   end subroutine move
 
-  !> Predicts the earliest event of disk i with a side, a cell face, an obstacle, or a disk in the nine cells around disk i.
+  !> Predicts the earliest event of disk i with a side, a cell face, an obstacle, or a disk in the 3 x 3 cells around it.
   subroutine predict(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -341,7 +341,7 @@ contains
     end if
   end subroutine predict_both
 
-  !> Predicts the next events of two disks that have collided, in the general case. In most calls both disks have neighbour lists.
+  !> General version of `predict_both`. The most frequent case is tested first: both disks have complete neighbour lists.
   subroutine predict_both_with_care(self, sim, i, j)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -360,7 +360,7 @@ contains
     call predict_collided(j)
   contains
 
-    !> Predicts the next event of disk k, which is disk i or disk j.
+    !> Predicts the next event of disk k, which is i or j.
     subroutine predict_collided(k)
       integer(int32), intent(in) :: k
 
@@ -372,7 +372,7 @@ contains
     end subroutine predict_collided
   end subroutine predict_both_with_care
 
-  !> Whether a small disk has a complete neighbour list without disks across a periodic side.
+  !> True if a small disk has a complete neighbour list without neighbours across a periodic side.
   pure function is_plainly_listed(self, cell, i) result(yes)
     class(cell_grid_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -382,7 +382,7 @@ contains
     yes = self%lists%is_short(i) .and. .not. self%patch%at_seam(cell)
   end function is_plainly_listed
 
-  !> Predicts the next events of two disks that have just collided, from their neighbour lists.
+  !> Predicts the next events of two disks that have just collided from their neighbour lists.
   subroutine predict_listed(self, sim, i, j)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
@@ -416,7 +416,7 @@ contains
     call self%lists%copy_list(near)
   end subroutine survey_list
 
-  !> Predicts the next events of two disks in unmarked cells. The candidates of both disks are listed before the tests begin.
+  !> Predicts the next events of two disks in unmarked cells. All candidates are collected before the first is tested.
   subroutine predict_two(self, box, disk, tag, now, known, pair)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -450,7 +450,7 @@ contains
     call take_earliest(box%gravity, disk, tag, now, known, near)
   end subroutine predict_one
 
-  !> Finds the time when a disk leaves its cell, and lists the candidates that the disk can touch before that time.
+  !> Finds the time at which a disk leaves its cell, and collects the candidates for a collision before that time.
   subroutine survey(self, box, disk, tag, now, known, near)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -465,7 +465,7 @@ contains
     call gather(self%cells%cell, near%cell, self%cells%stride, near%disk, near%list, near%n)
   end subroutine survey
 
-  !> Tests the candidates of a disk, finds its earliest event, and stores this event in the record of the disk.
+  !> Tests the candidates of a disk and stores its earliest event in its record.
   subroutine take_earliest(gravity, disk, tag, now, known, near)
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
     type(disk_t), intent(inout) :: disk(*)
@@ -480,7 +480,7 @@ contains
     tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! used only if the partner is a disk
   end subroutine take_earliest
 
-  !> Prefetches, in several stages, the data that are needed to predict the events of some disks.
+  !> Prefetches, in several stages, the data needed to predict the events of some disks.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -494,12 +494,12 @@ contains
     end if
   end subroutine read_ahead
 
-  !> Predicts the next event of a disk in the general case. A disk that has left the patch is removed from the search.
+  !> Predicts the next event of a disk in the general case. A disk that has left the block of cells is removed from the search.
   subroutine predict_with_care(self, sim, i, has_collided)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    logical, intent(in) :: has_collided            !! whether disk i has just collided, so that no other disk has a later clock
+    logical, intent(in) :: has_collided            !! whether disk i has just collided, which gives it the latest of all clocks
     type(prediction_t) :: near
     integer(int32) :: known                        ! as in `earliest_contact`
 
@@ -520,7 +520,7 @@ contains
     sim%tag(i)%partner_counter = sim%disk(max(near%partner, 1))%collision_counter
   end subroutine predict_with_care
 
-  !> Finds the earliest event of a big disk: a collision, or its departure from the margin around its reference position.
+  !> Finds the earliest event of a big disk: a contact, or its departure from the margin around its reference position.
   subroutine find_event_of_big(self, sim, known, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -542,13 +542,13 @@ contains
     end associate
   end subroutine find_event_of_big
 
-  !> Finds the earliest event of a small disk.
+  !> Finds the earliest event of a small disk, which may have a neighbour list.
   subroutine find_event_of_small(self, sim, known, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prediction_t), intent(inout) :: near
-    integer(int32) :: first                        ! first entry in the list of obstacles and big disks of the cell
+    integer(int32) :: first                        ! first entry in the cell's list of obstacles and big disks
 
     associate (i => near%disk, cell => sim%tag(near%disk)%cell)
       if (self%lists%used) then
@@ -573,7 +573,7 @@ contains
     end associate
   end subroutine find_event_of_small
 
-  !> Finds contacts of a small disk with the disks in its cell and in the eight cells around this cell.
+  !> Finds contacts of a small disk with the disks in its own cell and the eight cells around it.
   subroutine scan_cells_around(self, sim, known, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -9,13 +9,13 @@ module cell_layout
   private
   public :: whole_box
 
-  !> With fewer disks per cell, a prediction tests fewer candidates, but disks cross cell faces more often.
+  !> With fewer disks per cell, predictions test fewer candidates, but disks cross cells more often.
   real(real64), parameter :: disks_per_cell = 0.6_real64    !! intended mean number of disks per cell in a dilute system
 
 contains
 
-  !> Chooses the cells for all disks and obstacles of a simulation. For the number of disks per cell, an obstacle counts as a disk,
-  !> because each disk has to be tested against the obstacles that reach into its cell.
+  !> Chooses the cells for all disks and obstacles of a simulation. In the number of disks per cell,
+  !> obstacles count as disks, because each disk is also tested against the obstacles in its cell.
   pure function whole_box(sim, undivided) result(patch)
     type(simulation_t), intent(in) :: sim
     logical, intent(in) :: undivided

@@ -1,5 +1,6 @@
-!> Finds contacts that the simple search of nine cells does not find: contacts with disks in the linked lists of crowded cells, with
-!> disks across a periodic side, with obstacles and big disks, and with given disks.
+!> Finds contacts beyond the reach of the simple search of 3 x 3 cells: with disks in the linked
+!> lists of crowded cells, with disks across a periodic side, with obstacles and big disks, and with
+!> given disks.
 module cell_scans
   use kinds, only: int32, int64, real64
   use box_geometry, only: find_image_contact, stays_clear
@@ -8,7 +9,8 @@ module cell_scans
   use images, only: image_t, images_t
   use neighbour_lists, only: neighbour_lists_t
   use neighbour_search, only: earliest_contact, latest_clock, list_capacity, no_gravity, prediction_t
-  use object_lists, only: entry_t, object_lists_t, place_t
+  use grid, only: entry_t
+  use object_lists, only: object_lists_t, place_t
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -16,8 +18,8 @@ module cell_scans
 
 contains
 
-  !> Tests the candidates in `near`, and then empties the list of candidates. `earliest_contact` is called with literal arguments,
-  !> so that the compiler can generate specialised versions of this procedure.
+  !> Tests and then discards the candidates in `near`. The literal arguments of `earliest_contact`
+  !> let the compiler generate specialised versions.
   subroutine test_list(sim, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
@@ -37,7 +39,8 @@ contains
     near%n = 0
   end subroutine test_list
 
-  !> Tests the candidates in `near`, which are in a periodic image of the box, and then empties the list of candidates.
+  !> Tests and then discards the candidates in `near`, all of which belong to one periodic image of
+  !> the box.
   subroutine test_through_image(sim, known, image, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known
@@ -57,7 +60,7 @@ contains
     near%n = 0
   end subroutine test_through_image
 
-  !> Finds contacts with the given disks, which are all in one periodic image of the box.
+  !> Finds contacts with given disks, all of which belong to one periodic image of the box.
   subroutine scan_disks(sim, disks, image, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: disks(:)
@@ -110,7 +113,8 @@ contains
     if (near%n > 0) call test_disks()
   contains
 
-    !> Tests the big disks in the list of candidates, which are all in the same periodic image of the box.
+    !> Tests the big disks among the candidates, all of which belong to one periodic image of the
+    !> box.
     subroutine test_disks()
       if (all(last == 0)) then
         call test_list(sim, known, near)
@@ -145,7 +149,8 @@ contains
     end do
   end subroutine scan_list
 
-  !> Finds contacts with the disks in the given cells, which all belong to one periodic image of the box.
+  !> Finds contacts with the disks in given cells, all of which belong to one periodic image of the
+  !> box.
   subroutine scan_cells(cells, sim, c, images, number, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -168,8 +173,8 @@ contains
     if (near%n > 0) call test_through_image(sim, known, images%image(number), near)
   end subroutine scan_cells
 
-  !> Adds the disks in the linked list of a crowded cell to the candidates. The first disk of the linked list is also in a slot of
-  !> the cell.
+  !> Adds to the candidates the disks in the linked list of a crowded cell; the first of them is
+  !> also in a slot.
   subroutine add_chain(cells, sim, c, images, number, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -190,8 +195,8 @@ contains
     end do
   end subroutine add_chain
 
-  !> Finds contacts of a big disk with small disks in the cells along its boundary. All cells that belong to the same periodic image
-  !> are searched in one call.
+  !> Finds contacts of a big disk with small disks in the cells along its boundary. Cells of the
+  !> same periodic image are searched together.
   subroutine scan_rim(cells, sim, rim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -213,8 +218,8 @@ contains
     end do
   end subroutine scan_rim
 
-  !> Adds the disks in the linked lists of crowded cells to the candidates from `gather`. The procedure searches the cell of a disk
-  !> and its eight neighbours.
+  !> Adds to the candidates found by `gather` the disks in linked lists: those of the crowded cells
+  !> among the cell of a disk and its eight neighbours.
   subroutine add_chains_around(cells, sim, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -224,7 +229,8 @@ contains
 
     do row = near%cell - cells%stride, near%cell + cells%stride, cells%stride
       do c = row - 1, row + 1
-        ! The first disk of a linked list is also in a slot of its cell and already a candidate, unless `gather` omitted the disk.
+        ! The first disk of a linked list is also in a slot and already a candidate, unless `gather`
+        ! left it out.
         j = cells%chain(c)
         if (j > 0 .and. c /= near%cell) j = cells%next(j)
         do while (j > 0)
@@ -237,9 +243,9 @@ contains
     end do
   end subroutine add_chains_around
 
-  !> Finds contacts of a disk if some of the nine cells around the disk are across a periodic side. All cells that belong to the
-  !> same periodic image are searched in one call. A sheared box, in which the images above and below the box move along x, is
-  !> searched by `scan_around_moving_seam`.
+  !> Finds contacts of a disk near a periodic side, across which some of the 3 x 3 cells around it
+  !> lie. Cells of the same periodic image are searched together. In sheared boxes, where the images
+  !> above and below move along x, `scan_around_moving_seam` is used instead.
   subroutine scan_around_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
@@ -271,7 +277,7 @@ contains
     end do
   contains
 
-    !> The last of the adjacent rows or columns that belong to the same image as the given row or column.
+    !> Last of the adjacent rows or columns that belong to the same image as the given one.
     pure function last_alike(image, first) result(last)
       integer(int32), intent(in) :: image(-1:1), first
       integer(int32) :: last
@@ -281,7 +287,7 @@ contains
       if (first < 0 .and. image(1) == image(first)) last = 1
     end function last_alike
 
-    !> Tests the disks in a block of cells. All cells of the block belong to the same periodic image.
+    !> Tests the disks in a block of cells that all belong to the same periodic image.
     subroutine scan_block()
       integer(int64) :: n
       integer(int32) :: c, k, m, fullest
@@ -314,9 +320,9 @@ contains
     end subroutine scan_block
   end subroutine scan_around_seam
 
-  !> Like `scan_around_seam`, for a sheared box, in which the images above and below the box move along x. In the moving images the
-  !> search covers six columns instead of three, so that no contact is missed until the images have moved by the width of a column.
-  !> Disks in columns that are not adjacent cannot touch.
+  !> Version of `scan_around_seam` for sheared boxes, whose images above and below move along x. Six
+  !> columns of these images are searched instead of three, so that no contact is missed before the
+  !> images have moved by the width of a column.
   subroutine scan_around_moving_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch

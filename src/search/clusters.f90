@@ -1,128 +1,200 @@
-!> The collisions of a few disks that almost touch each other: do these collisions end, or is their number unbounded (inelastic
-!> collapse)?
+!> Decides whether the collisions of a few disks that almost touch each other come to an end, or whether their number is unbounded
+!> (inelastic collapse).
 !>
-!> The disks of a cluster move so little that the normals of their contacts do not change. The state of a cluster is therefore the
-!> gap of each contact and the velocity at which this gap closes, and not the positions and velocities of the disks. Gaps and
-!> closing velocities have no common part that limits their precision: they can decrease by hundreds of powers of ten, as in a
-!> collapse, without becoming dominated by rounding errors. The motion of the disks along their surfaces is included to first order:
-!> two disks that slip past each other at the velocity w separate with the acceleration w**2/r, where r is their distance (Zhou and
-!> Kadanoff, Physical Review E 54, 623 (1996)).
+!> The disks of such a cluster move so little that the normals of their contacts hardly change. Instead of positions and
+!> velocities, the state of a cluster consists of the gap of each contact and the velocity at which the gap closes. In a collapse
+!> these numbers decrease by hundreds of powers of ten. They remain exact to rounding, whereas differences of positions would soon
+!> be lost in the rounding errors of the positions themselves.
+!>
+!> Motion along the surfaces is included to first order. Two disks at the distance r, slipping past each other with the velocity w,
+!> separate with the acceleration w**2/r (Zhou and Kadanoff, Physical Review E 54, 623 (1996)). The normal of their contact turns at
+!> the angular velocity w/r, which matters only for the tangential impulses of rough disks.
 module clusters
   use kinds, only: int32, real64
-  use collisions, only: speed_law_t
+  use collisions, only: speed_law_t, tangential_impulse, tangential_law_t
   implicit none
   private
   public :: cluster_t, contact_t, most_disks
 
   integer(int32), parameter :: most_disks = 40       !! largest number of disks in a cluster
-  !> A series is unbounded if it has more than `longest` collisions per square of the number of disks that collide, or if closing
-  !> velocities have decreased by the factor `slowest`. Finite series are shorter and less slow, except within about 1 % of a limit
-  !> of collapse.
-  integer, parameter :: longest = 24
+  !> A series is considered unbounded if it has more than `longest` collisions per square of the number of colliding disks
+  !> (`longest_rough` for rough disks), or if its closing velocities have decreased by the factor `slowest`. Except within about 1 %
+  !> of a limit of collapse, finite series are shorter and slow down less.
+  integer, parameter :: longest = 24, longest_rough = 240
   real(real64), parameter :: slowest = 1.0e-200_real64
+  !> Largest angle between the normals of a row of disks that is straight except for rounding errors, which must not end its
+  !> collapse.
+  real(real64), parameter :: straight = 2.0_real64**(-33)
 
-  !> A contact of two disks, or of a disk with a side or an obstacle.
+  !> A contact of two disks, or of a disk with a side or an obstacle. Its tangent is its normal, turned by -90 degrees.
   type :: contact_t
     integer(int32) :: first = 0                      !! number of a disk in the cluster
-    integer(int32) :: second = 0                     !! number of the other disk; 0 for a side or an obstacle
+    integer(int32) :: second = 0                     !! number of the other disk in the cluster; 0 for a side or an obstacle
     real(real64) :: normal(2) = 0.0_real64           !! unit vector from the first disk to its partner
-    real(real64) :: gap = 0.0_real64                 !! distance of the surfaces [length]
+    real(real64) :: distance = huge(1.0_real64)      !! distance between the centres of two disks [length]
+    real(real64) :: gap = 0.0_real64                 !! distance between the surfaces [length]
     real(real64) :: closing = 0.0_real64             !! velocity at which the gap closes [length/time]
-    real(real64) :: opening = 0.0_real64             !! acceleration at which the gap opens [length/time**2]
+    real(real64) :: sliding = 0.0_real64             !! tangential velocity of the partner relative to the first disk [length/time]
+    real(real64) :: slip = 0.0_real64                !! tangential velocity of the first surface relative to the other [length/time]
+    real(real64) :: turn = 0.0_real64                !! angle by which the normal has turned towards the tangent
     real(real64) :: restitution = 1.0_real64
     type(speed_law_t) :: by_speed = speed_law_t()
+    type(tangential_law_t) :: tangential = tangential_law_t()
   end type contact_t
+
+  !> Changes of each contact (first index) per impulse of another contact (second index). [1/mass]
+  type :: couplings_t
+    real(real64), allocatable :: along(:, :)         !! of a velocity along the normal (tangent) by a normal (tangential) impulse
+    real(real64), allocatable :: across(:, :)        !! of a velocity along the tangent by a normal impulse
+    real(real64), allocatable :: rims(:, :)          !! of the velocities of rotating surfaces by a tangential impulse
+  end type couplings_t
 
   type :: cluster_t
     integer(int32) :: n = 0                          !! number of disks
     real(real64) :: mass(most_disks) = 1.0_real64    !! [mass]
+    real(real64) :: inertia = 0.5_real64             !! moment of inertia divided by mass times radius squared
     type(contact_t), allocatable :: contact(:)
   contains
     procedure :: follow
+    procedure, private :: couplings
+    procedure, private :: advance
+    procedure, private :: collide
   end type cluster_t
 
 contains
 
-  !> Follows the collisions until they end, until the time limit, or until their number is known to be unbounded.
+  !> Follows the collisions until they end, the time limit is reached, or their number is known to be unbounded.
   pure subroutine follow(self, limit, endless, duration, events)
     class(cluster_t), intent(inout) :: self
     real(real64), intent(in) :: limit                !! [time]
     logical, intent(out) :: endless                  !! whether the number of collisions is unbounded
     real(real64), intent(out) :: duration            !! time of the last collision, or of the limit point of a collapse [time]
-    integer, intent(out) :: events(most_disks)            !! number of collisions of each disk
-    real(real64) :: coupling(size(self%contact), size(self%contact)), slow, impulse, s, earliest
-    integer :: step, k, next, last
+    integer, intent(out) :: events(most_disks)       !! number of collisions of each disk
+    type(couplings_t) :: coupling
+    real(real64) :: slow, s, earliest                ! [length/time], [time], [time]
+    integer :: step, k, next, last, most
 
-    coupling = couplings(self)
+    coupling = self%couplings()
     endless = .false.
     duration = 0
     events = 0
     last = 0
     slow = slowest*maxval(abs(self%contact%closing))
-    associate (contact => self%contact)
-      step = 0
-      do while (step < longest*max(count(events > 0), 2)**2)
-        step = step + 1
-        next = 0
-        earliest = limit - duration
-        do k = 1, size(contact)
-          if (k == last .or. .not. contact(k)%closing > 0) cycle
-          s = time_to_close(contact(k))
-          if (s < earliest) then
-            earliest = s
-            next = k
-          end if
-        end do
-        if (next == 0) return
-        duration = duration + earliest
-        contact%gap = max(contact%gap - (contact%closing - 0.5_real64*contact%opening*earliest)*earliest, 0.0_real64)
-        contact%closing = contact%closing - contact%opening*earliest
-        contact(next)%gap = 0
-        associate (velocity => contact(next)%closing)
-          if (velocity < slow) exit
-          impulse = (1 + restitution_of(contact(next)))*velocity/coupling(next, next)
-          s = -restitution_of(contact(next))*velocity
-        end associate
-        contact%closing = contact%closing - coupling(:, next)*impulse
-        contact(next)%closing = s
-        last = next
-        do k = 1, self%n
-          if (any([contact(next)%first, contact(next)%second] == k)) events(k) = events(k) + 1
-        end do
+    most = merge(longest_rough, longest, any(self%contact%tangential%is_rough()))
+    step = 0
+    do while (step < most*max(count(events > 0), 2)**2)
+      step = step + 1
+      next = 0
+      earliest = limit - duration
+      do k = 1, size(self%contact)
+        if (k == last .or. .not. self%contact(k)%closing > 0) cycle
+        s = time_to_close(self%contact(k))
+        if (s < earliest) then
+          earliest = s
+          next = k
+        end if
       end do
-    end associate
+      if (next == 0) return
+      duration = duration + earliest
+      call self%advance(earliest)
+      if (self%contact(next)%closing < slow) exit
+      call self%collide(coupling, next)
+      last = next
+      do k = 1, self%n
+        if (any([self%contact(next)%first, self%contact(next)%second] == k)) events(k) = events(k) + 1
+      end do
+    end do
     endless = .true.
   end subroutine follow
 
-  !> Decrease of the closing velocity of each contact (first index) per impulse of another contact (second index).
+  !> Moves the disks for the time s.
+  pure subroutine advance(self, s)
+    class(cluster_t), intent(inout) :: self
+    real(real64), intent(in) :: s                    !! [time]
+    integer :: k
+
+    do k = 1, size(self%contact)
+      associate (contact => self%contact(k))
+        contact%gap = max(contact%gap - (contact%closing - 0.5_real64*opening(contact)*s)*s, 0.0_real64)
+        contact%closing = contact%closing - opening(contact)*s
+        contact%turn = contact%turn + contact%sliding/contact%distance*s
+      end associate
+    end do
+  end subroutine advance
+
+  !> Executes the collision of a contact.
+  pure subroutine collide(self, coupling, next)
+    class(cluster_t), intent(inout) :: self
+    type(couplings_t), intent(in) :: coupling
+    integer, intent(in) :: next
+    real(real64) :: across(size(self%contact))       ! [1/mass]
+    real(real64) :: mass, velocity, normal, tangential   ! reduced mass [mass], [length/time], impulses [mass length/time]
+
+    associate (contact => self%contact, along => coupling%along(:, next))
+      mass = 1/coupling%along(next, next)
+      velocity = -restitution_of(contact(next))*contact(next)%closing
+      normal = mass*(contact(next)%closing - velocity)
+      tangential = tangential_impulse(contact(next)%tangential, self%inertia, mass, contact(next)%slip, normal)
+      across = coupling%across(:, next) + (contact(next)%turn - contact%turn)*along
+      contact%closing = contact%closing - along*normal - across*tangential
+      contact%sliding = contact%sliding + across*normal - along*tangential
+      contact%slip = contact%slip - across*normal + (along + coupling%rims(:, next))*tangential
+      contact(next)%closing = velocity
+      contact(next)%gap = 0
+    end associate
+  end subroutine collide
+
+  !> The couplings of all contacts.
   pure function couplings(self) result(coupling)
     class(cluster_t), intent(in) :: self
-    real(real64) :: coupling(size(self%contact), size(self%contact))      !! [1/mass]
+    type(couplings_t) :: coupling
+    real(real64) :: shared(2), sine                  ! [1/mass], of the angle between the normals
     integer :: e, f
 
-    do f = 1, size(self%contact)
-      do e = 1, size(self%contact)
-        associate (a => self%contact(e), b => self%contact(f))
-          coupling(e, f) = 0
-          if (a%first == b%first) coupling(e, f) = coupling(e, f) + 1/self%mass(a%first)
-          if (a%first == b%second) coupling(e, f) = coupling(e, f) - 1/self%mass(a%first)
-          if (a%second > 0 .and. a%second == b%first) coupling(e, f) = coupling(e, f) - 1/self%mass(a%second)
-          if (a%second > 0 .and. a%second == b%second) coupling(e, f) = coupling(e, f) + 1/self%mass(a%second)
-          coupling(e, f) = coupling(e, f)*dot_product(a%normal, b%normal)
-        end associate
+    associate (n => size(self%contact))
+      allocate (coupling%along(n, n), coupling%across(n, n), coupling%rims(n, n))
+      do f = 1, n
+        do e = 1, n
+          associate (a => self%contact(e), b => self%contact(f))
+            shared = term(a%first, b%first, 1) + term(a%first, b%second, -1) + term(a%second, b%first, -1) &
+              + term(a%second, b%second, 1)
+            coupling%along(e, f) = shared(1)*dot_product(a%normal, b%normal)
+            sine = a%normal(2)*b%normal(1) - a%normal(1)*b%normal(2)
+            coupling%across(e, f) = merge(shared(1)*sine, 0.0_real64, abs(sine) > straight)
+            coupling%rims(e, f) = shared(2)/self%inertia
+          end associate
+        end do
       end do
-    end do
+    end associate
+  contains
+
+    !> Reciprocal mass of a disk shared by two contacts, with and without the sign; 0 if they share none.
+    pure function term(i, j, sign)
+      integer(int32), intent(in) :: i, j             !! numbers of the disks
+      integer, intent(in) :: sign
+      real(real64) :: term(2)                        !! [1/mass]
+
+      term = 0
+      if (i == j .and. i > 0) term = [sign, 1]/self%mass(i)
+    end function term
   end function couplings
 
-  !> Time until a closing gap is closed.
   pure function time_to_close(contact) result(s)
     type(contact_t), intent(in) :: contact
     real(real64) :: s, disc                          ! [time], [(length/time)**2]
 
     s = huge(s)
-    disc = contact%closing**2 - 2*contact%opening*contact%gap
+    disc = contact%closing**2 - 2*opening(contact)*contact%gap
     if (disc >= 0) s = 2*contact%gap/(contact%closing + sqrt(disc))
   end function time_to_close
+
+  !> Acceleration at which the gap opens, because the disks slip past each other.
+  pure function opening(contact)
+    type(contact_t), intent(in) :: contact
+    real(real64) :: opening                          !! [length/time**2]
+
+    opening = contact%sliding**2/contact%distance
+  end function opening
 
   !> Coefficient of restitution at the present closing velocity.
   pure function restitution_of(contact) result(xi)

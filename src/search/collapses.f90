@@ -1,14 +1,13 @@
-!> Detects inelastic collapses, which are unbounded numbers of collisions in a finite time, and counts the collisions that occur at
-!> one time.
+!> Detects inelastic collapses (unbounded numbers of collisions in a finite time), and counts collisions at exactly the same time.
 !>
-!> If the gap of two disks was negligible before they collided, the collision may belong to a collapse. The simulation itself does
-!> not show whether it does: near a limit of collapse, rounding errors of the positions, or of a common velocity, determine the
-!> motion before time stops. The disks that almost touch are therefore copied to a cluster, whose collisions are followed without
-!> such rounding errors (see `clusters`). The verdict depends on the state at a collision alone, and not on the search, the number
-!> of threads or the times at which the run pauses.
+!> A collision may belong to a collapse if the gap between the two disks was negligible even before they approached each other. The
+!> simulation itself cannot decide: near a limit of collapse, rounding errors of the positions, or of a common velocity, determine
+!> the motion before time stops advancing. The disks that almost touch are therefore copied to a cluster, whose collisions are
+!> followed without such errors (see `clusters`). The verdict depends only on the state at the collision, not on the search, the
+!> number of threads or the pauses of the run.
 module collapses
   use kinds, only: int32, int64, never, real64
-  use box_geometry, only: wall_normal
+  use box_geometry, only: tangential_surface_velocity, wall_normal
   use box_sides, only: bounds
   use clusters, only: cluster_t, contact_t, most_disks
   use disks, only: disk_t, advance_disk
@@ -18,15 +17,16 @@ module collapses
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: watch
+  public :: still, watch
 
-  !> Largest relative displacement of two disks since the later of their previous events, and largest decrease of their gap, for
-  !> which a collision is examined. [sum of the radii]
-  real(real64), parameter :: still = 2.0_real64**(-10), negligible = 2.0_real64**(-33)
-  !> Smallest decrease of a gap that rounding errors do not determine [spacing of the coordinates]
+  !> A collision is examined if the two disks have hardly moved since the later of their previous events: neither their relative
+  !> displacement nor the decrease of their gap may exceed these values. [sum of the radii]
+  real(real64), parameter :: still = 2.0_real64**(-14), negligible = 2.0_real64**(-33)
+  !> Smallest decrease of a gap, and smallest sliding velocity, above the level of rounding errors [spacing of the coordinates, or
+  !> of the velocities]
   real(real64), parameter :: resolved = 4.0_real64
-  !> Largest gap between neighbouring disks of a cluster, and largest gap between a disk of the cluster and the colliding disks.
-  !> [sum of the radii]
+  !> Largest gap between neighbouring disks of a cluster, and between any disk of the cluster and the colliding disks [sum of the
+  !> radii]
   real(real64), parameter :: reach = 0.125_real64, farthest = 16.0_real64
 
 contains
@@ -36,7 +36,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
-    logical, intent(in) :: is_part                   !! whether `sim` is a domain, which lacks disks of the cluster
+    logical, intent(in) :: is_part                   !! whether `sim` is a domain, which may lack disks of the cluster
     real(real64) :: s, dx(2), dv(2)
     logical :: is_resolved                           ! whether rounding errors are smaller than the decrease of the gap
 
@@ -64,30 +64,30 @@ contains
       if (is_resolved .or. any(events > known)) then
         call judge(sim, i, j, t, is_resolved)
       else
-        ! A series outlives its prediction because rounding errors now determine the gaps.
+        ! The series has outlived its prediction, because rounding errors now determine the gaps.
         sim%series(sim%tag([i, j])%id)%known_until = events + 1
       end if
     end associate
   end subroutine watch
 
-  !> Adds a collision to its series: the collisions of one time that are connected through shared disks. The first collision of a
-  !> series is added together with the second.
+  !> Adds a collision to its series: the collisions at one and the same time that are connected by shared disks. The first two
+  !> collisions of a series are added together.
   subroutine count_collision(sim, i, j, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
-    integer(int32) :: a, b
+    integer(int32) :: first, second                  ! in the order of their ids, not of memory, so that checkpoints agree
 
     if (.not. min(sim%disk(i)%clock, sim%disk(j)%clock) < t) sim%tally%simultaneous = sim%tally%simultaneous + 1
-    call join(i)
-    call join(j)
-    a = sim%tag(i)%id
-    b = sim%tag(j)%id
-    call unite(a, b)
+    first = merge(i, j, sim%tag(i)%id < sim%tag(j)%id)
+    second = i + j - first
+    call join(first)
+    call join(second)
+    call unite(sim%tag(first)%id, sim%tag(second)%id)
   contains
 
-    !> Begins a series with disk k, unless the disk belongs to a series of this time. If the disk has already collided at this time,
-    !> this collision, with its last partner, is added.
+    !> Starts a series with disk k, unless the disk already belongs to a series at this time. If disk k has already collided at this
+    !> time, the collision with its last partner is added.
     subroutine join(k)
       integer(int32), intent(in) :: k
 
@@ -100,7 +100,7 @@ contains
       end associate
     end subroutine join
 
-    !> Begins a series that consists of one disk.
+    !> Starts a series that consists of one disk.
     subroutine begin(id)
       integer(int32), intent(in) :: id
 
@@ -112,7 +112,7 @@ contains
       end associate
     end subroutine begin
 
-    !> Adds a collision of the disks with the ids a and b, whose series become one.
+    !> Adds a collision of the disks with the ids a and b, merging their series.
     subroutine unite(a, b)
       integer(int32), intent(in) :: a, b
       integer(int32) :: root, other
@@ -130,21 +130,21 @@ contains
       end associate
     end subroutine unite
 
-    !> The id of the disk that represents the series of a disk.
+    !> Id of the disk that represents the series of a given disk.
     function root_of(id) result(root)
       integer(int32), intent(in) :: id
       integer(int32) :: root
 
       root = id
       do while (sim%series(root)%root /= root)
-        sim%series(root)%root = sim%series(sim%series(root)%root)%root     ! makes later searches shorter
+        sim%series(root)%root = sim%series(sim%series(root)%root)%root     ! shortens later searches
         root = sim%series(root)%root
       end do
     end function root_of
   end subroutine count_collision
 
-  !> Determines whether the collisions of disks i and j, and of the disks around them, are a collapse. If the collisions end, they
-  !> are not examined again before the disks have had as many collisions as predicted. If rounding errors determine the gaps, the
+  !> Determines whether the collisions of disks i and j, and of the disks around them, are a collapse. If their number is finite,
+  !> the disks are not examined again before they have collided as often as predicted. If rounding errors determine the gaps, the
   !> number of collisions until the next examination doubles each time.
   subroutine judge(sim, i, j, t, is_resolved)
     type(simulation_t), intent(inout) :: sim
@@ -159,7 +159,7 @@ contains
 
     call find_members(sim, i, j, t, member, cluster%n)
     call list_contacts(sim, t, member(:cluster%n), cluster)
-    limit = sim%drive%time_of(sim%kicks + 1) - sim%box%epoch - t     ! a kick ends a series
+    limit = sim%kick_time(sim%kicks + 1) - sim%box%epoch - t     ! a kick ends a series
     call cluster%follow(limit, endless, duration, events)
     if (endless) then
       sim%tally%collapse = sim%box%epoch + t + duration
@@ -175,19 +175,19 @@ contains
     end do
   end subroutine judge
 
-  !> Lists the disks of the cluster around disks i and j, in the order of their ids: disks that are connected with i through gaps of
-  !> at most `reach`.
+  !> Lists the disks of the cluster around disks i and j, in the order of their ids: all disks
+  !> connected with i through gaps of at most `reach`.
   subroutine find_members(sim, i, j, t, member, n)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
     integer(int32), intent(out) :: member(most_disks), n
-    integer(int32), allocatable :: near(:)           ! indices of the disks that are not far from disk i
+    integer(int32), allocatable :: near(:)           ! indices of the disks close to disk i
     logical, allocatable :: found(:)
     integer(int32) :: k, m, first
 
     first = merge(i, j, sim%tag(i)%id < sim%tag(j)%id)
-    near = pack([(k, k=1, sim%n_disks())], [(gap(first, k) <= farthest, k=1, sim%n_disks())])
+    near = pack([(k, k=1, sim%n_disks())], [(sim%is_inside(k) .and. gap(first, k) <= farthest, k=1, sim%n_disks())])
     allocate (found(size(near)))
     found = near == i .or. near == j
     member(:2) = [first, i + j - first]
@@ -211,7 +211,7 @@ contains
     end do
   contains
 
-    !> Gap of two disks, divided by the sum of the radii of disks i and j.
+    !> Gap between two disks, divided by the sum of the radii of disks i and j.
     function gap(a, b)
       integer(int32), intent(in) :: a, b
       real(real64) :: gap, dx(2), dv(2)
@@ -231,6 +231,7 @@ contains
     type(contact_t) :: contact
 
     allocate (cluster%contact(0))
+    cluster%inertia = sim%law%inertia
     do a = 1, cluster%n
       cluster%mass(a) = sim%mass_of(member(a))
       cluster%contact = [cluster%contact, surface_contacts(sim, t, member(a), a)]
@@ -242,11 +243,12 @@ contains
     end do
   contains
 
-    !> The contact of two disks.
+    !> Contact of two disks of the cluster.
     function contact_of(a, b) result(contact)
       integer(int32), intent(in) :: a, b
       type(contact_t) :: contact
       real(real64) :: dx(2), dv(2), distance, sigma
+      real(real64) :: noise                          ! rounding error of the sliding velocity [length/time]
 
       call relative_motion(sim, member(a), member(b), t, dx, dv)
       distance = magnitude(dx)
@@ -256,14 +258,22 @@ contains
       contact%normal = dx/distance
       contact%gap = max((dot_product(dx, dx) - sigma*sigma)/(distance + sigma), 0.0_real64)
       contact%closing = -dot_product(dv, contact%normal)
-      contact%opening = (contact%normal(1)*dv(2) - contact%normal(2)*dv(1))**2/distance
+      contact%distance = distance
+      contact%sliding = contact%normal(2)*dv(1) - contact%normal(1)*dv(2)
+      associate (p => sim%disk(member(a)), q => sim%disk(member(b)))
+        contact%slip = -contact%sliding - p%radius*sim%spin(member(a)) - q%radius*sim%spin(member(b))
+        ! The collapse of a straight row must not be ended by rounding errors of a common velocity or of a fall.
+        noise = spacing(maxval(abs([p%v, q%v]))) + magnitude(dv)/distance*spacing(maxval(abs([p%x, q%x])))
+        if (abs(contact%sliding) <= resolved*noise) contact%sliding = 0
+      end associate
       contact%restitution = sim%law%restitution(sim%tag(member(a))%species, sim%tag(member(b))%species)
       contact%by_speed = sim%law%by_speed
+      contact%tangential = sim%law%tangential
     end function contact_of
   end subroutine list_contacts
 
-  !> Contacts of disk i, whose number in the cluster is `number`, with sides and obstacles. A curved surface is replaced by its
-  !> tangent, and a thermal wall by an elastic wall.
+  !> Contacts with sides and obstacles of disk i, whose number in the cluster is `number`. A curved
+  !> surface is replaced by its tangent, and a thermal wall by an elastic one.
   function surface_contacts(sim, t, i, number) result(contacts)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: t
@@ -279,31 +289,40 @@ contains
     call bounds(sim%box, t, lower, upper)
     do k = 1, n_sides
       side = 1 - k
-      if (sim%box%periodic(axis_of(side))) cycle
+      if (sim%box%periodic(axis_of(side)) .or. sim%box%open(k)) cycle
       normal = -wall_normal(sim%box, side, disk%x, disk%v)
       position = merge(lower(axis_of(side)), upper(axis_of(side)), sense_of(side) < 0)
-      call add(sense_of(side)*(position - disk%x(axis_of(side))) - disk%radius, normal, sim%box%side_velocity(k, t), k)
+      call add(side, sense_of(side)*(position - disk%x(axis_of(side))) - disk%radius, normal, sim%box%side_velocity(k, t))
     end do
     do k = 1, sim%box%n_obstacles()
       associate (shape => sim%box%obstacle(k)%shape)
         d = shape%from_nearest(disk%x, sim%box%images(), heading=-disk%v)
         if (shape%gap(d, disk%radius) > reach*disk%radius) cycle
-        call add(shape%gap(d, disk%radius), -shape%normal(d, heading=-disk%v), 0.0_real64, sim%box%surface_of(obstacle_code(k)))
+        call add(obstacle_code(k), shape%gap(d, disk%radius), -shape%normal(d, heading=-disk%v), 0.0_real64)
       end associate
     end do
   contains
 
     !> Adds a contact if its gap is not too large.
-    subroutine add(gap, normal, velocity, surface)
+    subroutine add(code, gap, normal, velocity)
+      integer(int32), intent(in) :: code             !! see `partners`
       real(real64), intent(in) :: gap, normal(2)     !! [length], unit vector towards the surface
       real(real64), intent(in) :: velocity           !! velocity of the surface towards the disk [length/time]
-      integer, intent(in) :: surface                 !! index of the surface
+      type(contact_t) :: contact
 
       if (gap > reach*disk%radius) return
-      associate (law => sim%box%surface(surface)%law)
-        contacts = [contacts, contact_t(number, 0, normal, max(gap, 0.0_real64), dot_product(disk%v, normal) + velocity, &
-          0.0_real64, merge(1.0_real64, law%restitution, law%temperature > 0), law%by_speed)]
+      contact%first = number
+      contact%normal = normal
+      contact%gap = max(gap, 0.0_real64)
+      contact%closing = dot_product(disk%v, normal) + velocity
+      contact%sliding = dot_product(tangential_surface_velocity(sim%box, code, disk%x, -normal) - disk%v, [normal(2), -normal(1)])
+      contact%slip = -contact%sliding - disk%radius*sim%spin(i)
+      associate (law => sim%box%surface(sim%box%surface_of(code))%law)
+        contact%restitution = merge(1.0_real64, law%restitution, law%temperature > 0)
+        contact%by_speed = law%by_speed
+        contact%tangential = law%tangential
       end associate
+      contacts = [contacts, contact]
     end subroutine add
   end function surface_contacts
 

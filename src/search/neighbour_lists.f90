@@ -1,18 +1,20 @@
-!> Neighbour lists. The list of a disk contains the disks that it can touch while both disks stay in their neighbourhoods.
+!> Neighbour lists. The list of a disk contains the disks that it could touch while the centres of
+!> both stay within their neighbourhoods.
 !>
-!> The neighbourhood of a disk is the part of a square that is inside the cell of the disk and inside the box. The centre of the
-!> square is the position at which the disk received its neighbour list. Two disks are in each other's lists if they can touch
-!> somewhere in their neighbourhoods. An event occurs when a disk leaves its neighbourhood: the nine cells around the disk are then
-!> searched, and the disk receives a new neighbourhood and a new list. A prediction therefore tests only a few neighbours, however
-!> many disks the cells contain (Donev, Torquato and Stillinger, Journal of Computational Physics 202, 737 (2005)).
+!> The neighbourhood of a disk is a square around the position at which its list was made, clipped
+!> at the faces of its cell and at the sides of the box. When the disk leaves this square, which is
+!> an event, its list expires: a new list is made from the 3 x 3 cells around the disk, with a new
+!> neighbourhood. A prediction therefore tests only a few neighbours, however many disks the cells
+!> contain (Donev, Torquato and Stillinger, Journal of Computational Physics 202, 737 (2005)).
 !>
-!> Neighbour lists only save time and do not change results. A list without space for a further neighbour is marked as incomplete
-!> until the disk receives a new list. While the list of a disk is incomplete, each prediction searches the nine cells around the
-!> disk.
+!> Lists save time without changing results. A list without space for a further neighbour is marked
+!> as incomplete; until the disk receives a new one, its predictions search the 3 x 3 cells around
+!> it.
 !>
-!> If the radii differ so much that nine cells contain very many disks, the disks with small neighbourhoods are also listed in a
-!> second grid of narrow cells, according to the centres of their neighbourhoods. A new list of such a disk then needs only the nine
-!> narrow cells around its centre, and the few disks with large neighbourhoods in the nine wide cells.
+!> If the radii differ so much that 3 x 3 cells contain very many disks, the disks with small
+!> neighbourhoods are also sorted into a second grid of narrow cells, by the centres of their
+!> neighbourhoods. Their new lists then need only 3 x 3 narrow cells, and the few disks with large
+!> neighbourhoods in 3 x 3 wide cells.
 module neighbour_lists
   use, intrinsic :: iso_fortran_env, only: real32
   use kinds, only: int16, int32, int64, pi, real64
@@ -26,30 +28,33 @@ module neighbour_lists
   private
   public :: neighbour_lists_t
 
-  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! values in place of the number of entries of a list
-  !> Number of array elements that are copied from every list, even if the list is shorter, so that copying a short list needs no
-  !> branch.
+  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! values that replace the number of entries of a list
+  !> Number of array elements copied from every list, however short, because copying a fixed number
+  !> needs no branch.
   integer(int32), parameter :: always_copied = 15
-  !> Factor by which the index of a periodic image is multiplied in an entry of a list. The factor exceeds the index of every disk.
+  !> Factor of the image index in an entry of a list, larger than the index of any disk.
   integer(int32), parameter :: image_unit = 2**27
-  !> Largest number of disks for which neighbour lists are used, so that 32-bit integers can number all entries.
+  !> Largest number of disks for which lists are used, so that 32-bit integers can number all
+  !> entries.
   integer(int32), parameter :: most_listed = image_unit/4
 
-  !> Smallest width of narrow cells, in units of the radius plus margin of a disk with the mean radius. The width exceeds 2, so that
-  !> most disks can be in narrow cells.
+  !> Smallest width of the cells of the second, narrow grid, divided by the radius plus margin of a
+  !> disk of mean radius. A disk fits into a narrow cell if its radius plus margin is at most half the
+  !> width of the cell. With a value above 2, this includes all disks up to the mean radius and some
+  !> larger ones.
   real(real64), parameter :: narrow_width = 2.2_real64
 
-  !> The region around a disk for which its neighbour list is valid. When the centre of a disk leaves its neighbourhood, the disk
-  !> receives a new list.
+  !> The region around a disk for which its list is valid. When the centre of the disk leaves it,
+  !> the list expires.
   type :: neighbourhood_t
-    type(line_t) :: column(0:1), row(0:1)          !! (left, right) and (lower, upper) lines that limit the region
+    type(line_t) :: column(0:1), row(0:1)          !! (left, right) and (lower, upper) lines that bound the region
   end type neighbourhood_t
 
   real(real64), parameter, public :: candidates_that_pay = 30.0_real64
 
   type :: neighbour_lists_t
     logical :: used = .false.
-    !> Smallest mean number of disks in nine cells for which neighbour lists save time in a dilute system.
+    !> Smallest mean number of disks in 3 x 3 cells for which lists save time in a dilute system.
     real(real64) :: least_candidates = candidates_that_pay
     integer(int32) :: capacity = 16                !! capacity of the list of a small disk; larger disks have more neighbours
     real(real64) :: mean_radius = 0.0_real64       !! [length]
@@ -58,18 +63,21 @@ module neighbour_lists
     real(real64) :: period(2) = 0.0_real64         !! edges of the box [length]
     real(real32) :: rounding = 0.0_real32          !! upper bound of the rounding errors in `extent` [length]
     type(neighbourhood_t), allocatable :: neighbourhood(:)   !! (disks)
-    !> (4,disks) x and y of the centre relative to `origin`, radius plus `rounding`, and half the width of the neighbourhood before
-    !> clipping [length]
+    !> (4,disks) x and y of the centre relative to `origin`, radius plus `rounding`, and half the
+    !> width of the neighbourhood before clipping [length]
     real(real32), allocatable :: extent(:, :)
-    !> (disks+1) position in `entry` of the list of each disk. A list begins with the number of its entries.
+    !> (disks+1) position in `entry` of the list of each disk. A list begins with the number of its
+    !> entries.
     integer(int32), allocatable :: first(:)
-    !> (0:) all lists. Each entry is the index of a disk, counted from 0, plus `image_unit` times the index of a periodic image.
+    !> (0:) all lists. Each entry is the index of a disk, counted from 0, plus `image_unit` times an
+    !> image index.
     integer(int32), allocatable :: entry(:)
-    !> (0:) for the entry of disk j in the list of disk i, the position of the entry of disk i in the list of disk j.
+    !> (0:) for the entry of disk j in the list of disk i, the position of the reverse entry, that
+    !> of disk i in the list of disk j.
     integer(int32), allocatable :: back(:)
     integer(int32) :: parts = 1                    !! number of narrow cells per cell along each axis; 1 without narrow cells
     real(real32) :: narrow_extent = 0.0_real32     !! largest radius plus margin of disks in narrow cells [length]
-    type(patch_t) :: narrow_patch                  !! the narrow cells, which are parts of the cells of the whole box
+    type(patch_t) :: narrow_patch                  !! the narrow cells, which subdivide the cells of the whole box
     type(cell_contents_t) :: narrow                !! disks in narrow cells
     type(cell_contents_t) :: wide                  !! all other disks with lists, in wide cells
   contains
@@ -89,9 +97,10 @@ module neighbour_lists
 
 contains
 
-  !> Allocates the neighbour lists if they are expected to save time. With neighbour lists, a prediction after a collision tests
-  !> fewer disks. The disadvantage of neighbour lists is that they must be renewed, more frequently at lower densities. The limit
-  !> `least_candidates` and the width of the neighbourhoods were optimised for polydisperse disks.
+  !> Allocates the neighbour lists if they are expected to save time. With lists, a prediction after
+  !> a collision tests fewer disks, but the lists themselves must be renewed, which happens more
+  !> often at lower densities. `least_candidates` and the width of the neighbourhoods were optimised
+  !> for polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, patch)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -124,7 +133,7 @@ contains
     call self%cut_cells(patch, int(minval(patch%width)/(narrow_width*(self%mean_radius + self%margin)), int32))
   end subroutine prepare
 
-  !> Allocates empty lists for all disks. Larger disks have longer lists, because larger disks have more neighbours.
+  !> Allocates empty lists for all disks, longer ones for larger disks, which have more neighbours.
   subroutine make_room(self, disk, lower, edges)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -179,7 +188,7 @@ contains
     end associate
   end subroutine cut_cells
 
-  !> Whether disk i belongs into a narrow cell.
+  !> True if disk i belongs in a narrow cell.
   pure function is_narrow(self, i) result(yes)
     type(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -188,7 +197,7 @@ contains
     yes = self%extent(3, i) + self%extent(4, i) <= self%narrow_extent
   end function is_narrow
 
-  !> The narrow cell that contains the centre of the neighbourhood of disk i.
+  !> Narrow cell that contains the centre of the neighbourhood of disk i.
   pure function narrow_cell(self, i) result(cell)
     type(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -197,7 +206,7 @@ contains
     cell = int(self%narrow_patch%cell_at(self%origin + self%extent(:2, i)), int16)
   end function narrow_cell
 
-  !> Sets up a new neighbourhood around disk i, whose position is x.
+  !> Sets up a new neighbourhood around disk i at the position x.
   pure subroutine lay(self, i, radius, x, faces, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -213,8 +222,8 @@ contains
     self%neighbourhood(i)%row = clipped(faces%row(:, cell(2)), 2)
   contains
 
-    !> The two lines that limit a neighbourhood along an axis. Each line is a face of the cell or an edge of the square, whichever
-    !> is closer to the disk.
+    !> The two lines that bound a neighbourhood along an axis: on either side the face of the cell
+    !> or the edge of the square, whichever is closer.
     pure function clipped(line, axis) result(nearer)
       type(line_t), intent(in) :: line(0:1)
       integer(int32), intent(in) :: axis
@@ -234,7 +243,7 @@ contains
     end function clipped
   end subroutine lay
 
-  !> Finds the disks that disk i can touch in its new neighbourhood, and makes the list of disk i.
+  !> Finds the disks that disk i can touch in its new neighbourhood, and makes its list.
   subroutine enter(self, i, cells, patch, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -257,9 +266,9 @@ contains
     end if
   end subroutine enter
 
-  !> Searches a cell and its eight neighbours for disks that disk i can touch in its neighbourhood. The procedure adds disk i to
-  !> the list of each disk found, and each disk found to the list of disk i. Pairs with a disk that has no list yet are added later,
-  !> when the list of that disk is made.
+  !> Searches a cell and its eight neighbours for disks that disk i can touch in its neighbourhood,
+  !> and enters each pair in both lists. Pairs with a disk that has no list yet are entered when its
+  !> list is made.
   subroutine search(self, i, cells, patch, cell)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -297,8 +306,8 @@ contains
     self%extent(4, i) = own(4)
   contains
 
-    !> Adds the disks in the linked list of a crowded cell to the neighbour list of disk i. The first disk of the linked list is
-    !> also in the last slot of the cell and has already been added.
+    !> Adds the disks in the linked list of a crowded cell to the neighbour list of disk i, except
+    !> the first one, which is also in the last slot and thus already added.
     subroutine add_chain(c, image)
       integer(int32), intent(in) :: c, image
       integer(int32) :: j
@@ -313,8 +322,8 @@ contains
       end do
     end subroutine add_chain
 
-    !> Adds the candidates that are close enough to disk i. The distance is tested without a branch, because a processor cannot
-    !> predict the result of the test.
+    !> Adds the candidates close enough to disk i. The test is free of branches, which would often
+    !> be mispredicted.
     subroutine test_candidates(image)
       integer(int32), intent(in) :: image          !! periodic image that contains the candidates
       integer(int32) :: j, k, found(list_capacity + 1), n_found
@@ -344,8 +353,8 @@ contains
     end subroutine test_candidates
   end subroutine search
 
-  !> Adds disk j to the list of disk i, and disk i to the list of disk j. `image` is the periodic image in which disk i can touch
-  !> disk j. If disk j has no list yet, nothing is added.
+  !> Enters disks i and j in each other's lists, unless disk j has no list yet. `image` is the
+  !> periodic image in which disk i can touch disk j.
   pure subroutine add_pair(self, i, j, image)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, j, image
@@ -407,7 +416,7 @@ contains
     end do
   end subroutine leave
 
-  !> Removes an entry from the list of disk i. The last entry of the list is moved to the position of the removed entry.
+  !> Removes an entry from the list of disk i by moving the last entry to its position.
   pure subroutine remove(self, i, place)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, place
@@ -418,12 +427,12 @@ contains
     last = self%entry(at + n)
     self%entry(at + place) = last
     self%back(at + place) = self%back(at + n)
-    ! The new value of `back` is not used if the list of the other disk is incomplete.
+    ! If the list of the other disk is incomplete, this value of `back` is never used.
     self%back(self%first(iand(last, image_unit - 1) + 1) + self%back(at + n)) = place
     self%entry(at) = n - 1
   end subroutine remove
 
-  !> Removes an entry from the list of disk i, if the list contains this entry.
+  !> Removes an entry from the list of disk i, if it is there.
   pure subroutine remove_disk(self, i, entry)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, entry
@@ -436,7 +445,7 @@ contains
     end do
   end subroutine remove_disk
 
-  !> Lists a cell and its eight neighbours, and the periodic image to which each of these nine cells belongs.
+  !> Lists a cell and its eight neighbours, with the periodic image to which each belongs.
   pure subroutine find_cells(cells, patch, cell, around, image)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
@@ -452,7 +461,8 @@ contains
     end do
   end subroutine find_cells
 
-  !> If disk i can touch the image `image` of disk j, the result is the index of the image of disk i that disk j can touch.
+  !> Index of the image of disk i that disk j can touch, if disk i can touch the image `image` of
+  !> disk j.
   elemental function reverse(image)
     integer(int32), intent(in) :: image
     integer(int32) :: reverse
@@ -460,7 +470,8 @@ contains
     reverse = merge(9 - image, 0, image > 0)
   end function reverse
 
-  !> Index of an image along each axis: -1, 0 or 1. An entry encodes the indices x and y of an image as x + 3 y, modulo 9.
+  !> Index of an image along each axis: -1, 0 or 1. An entry encodes the indices x and y as x + 3 y,
+  !> modulo 9.
   pure function periods(image) result(number)
     integer(int32), intent(in) :: image
     real(real64) :: number(2)
@@ -468,7 +479,7 @@ contains
     number = [modulo(image + 4, 3) - 1, modulo(image + 4, 9)/3 - 1]
   end function periods
 
-  !> Whether the list of disk i contains all disks that disk i can touch in its neighbourhood.
+  !> True if the list of disk i contains all disks that disk i can touch in its neighbourhood.
   pure function is_complete(self, i) result(yes)
     class(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -477,7 +488,7 @@ contains
     yes = self%entry(self%first(i)) >= 0
   end function is_complete
 
-  !> Whether the list of disk i is complete and fits into the list of candidates.
+  !> True if the list of disk i is complete and fits into the list of candidates.
   pure function is_short(self, i) result(yes)
     class(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -488,7 +499,8 @@ contains
     end associate
   end function is_short
 
-  !> Copies the neighbour list of a disk to the list of candidates. The list must not contain neighbours across a periodic side.
+  !> Copies the neighbour list of a disk, which must not contain neighbours across a periodic side,
+  !> to its candidates.
   pure subroutine copy_list(self, near)
     class(neighbour_lists_t), intent(in) :: self
     type(prediction_t), intent(inout) :: near
@@ -511,8 +523,8 @@ contains
     n = max(self%entry(self%first(i)), 0)
   end function n_entries
 
-  !> The k-th neighbour in the list of disk i, counted from 0, and the index of the periodic image in which disk i can touch this
-  !> neighbour.
+  !> The k-th neighbour, counted from 0, in the list of disk i, and the periodic image in which disk
+  !> i can touch it.
   pure subroutine neighbour(self, i, k, j, image)
     class(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i, k
@@ -525,9 +537,9 @@ contains
     end associate
   end subroutine neighbour
 
-  !> Prefetches the data that are needed to predict the events of some disks. Prefetching has three stages: first the records of the
-  !> given disks, then their neighbour lists, and finally the disks in the lists. The data for the collision partner of a disk are
-  !> prefetched one stage later than the data for the disk.
+  !> Prefetches the data needed to predict the next events of several disks, in three stages: the
+  !> records of the disks, their neighbour lists, and the disks in these lists. The collision
+  !> partner of a disk is one call behind in each stage.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(neighbour_lists_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -553,7 +565,6 @@ contains
     end do
   contains
 
-    !> Prefetches the record and tag of a disk, and the position of its list.
     subroutine fetch_record(i)
       integer(int32), intent(in) :: i
 
@@ -562,7 +573,6 @@ contains
       call prefetch(self%first(i))
     end subroutine fetch_record
 
-    !> Prefetches the neighbourhood and the list of a disk.
     subroutine fetch_list(i)
       integer(int32), intent(in) :: i
 

@@ -1,5 +1,5 @@
-!> Defines types for predicted events, and the procedure `earliest_contact`, which predicts contacts of disks. All search methods
-!> use `earliest_contact`.
+!> Predicted events, and the procedure `earliest_contact`, with which all search methods predict
+!> disk-disk contacts.
 module neighbour_search
   use images, only: image_t
   use kinds, only: int32, never, real64
@@ -10,10 +10,10 @@ module neighbour_search
   public :: event_t, prediction_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
 
   integer(int32), parameter :: list_capacity = 64
-  !> Flags for conditions that the caller of `earliest_contact` guarantees. The sum of the two flags means that both conditions
-  !> hold. The flag `latest_clock` means that the clock of the disk is `now` and that no candidate has a later clock. The flag
-  !> `no_gravity` means that no gravity acts on the disks. The compiler generates versions of `earliest_contact` without the
-  !> operations that a flag makes unnecessary.
+  !> Guarantees given by the caller of `earliest_contact`; both are given by the sum of the two
+  !> flags. `latest_clock`: the clock of the disk is `now`, and no candidate has a later clock.
+  !> `no_gravity`: no gravity acts on the disks. For each combination the compiler generates a
+  !> version without unneeded operations.
   integer(int32), parameter :: latest_clock = 1, no_gravity = 2
   real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)    !! larger than all rounding errors in `earliest_contact`
 
@@ -21,11 +21,12 @@ module neighbour_search
   type :: event_t
     real(real64) :: time = 0.0_real64         !! time of the event, relative to the time origin `box%epoch` [time]
     integer(int32) :: disk = 0                !! disk that stores the event
-    integer(int32) :: partner = 0             !! partner in the event: a disk (> 0) or a code (<= 0)
+    integer(int32) :: partner = 0             !! partner in the event: a disk (> 0) or a boundary id or other code (<= 0)
   end type event_t
 
-  !> The state of a prediction for one disk: the earliest event that is known so far, and the candidates that the disk may touch
-  !> before this event. The components have no initial values, because the initialisation would take time in each prediction.
+  !> State of a prediction for one disk: the earliest event found so far, and the candidates for an
+  !> earlier one. The components have no initial values, because setting them would cost time in
+  !> each prediction.
   type :: prediction_t
     real(real64) :: time                      !! time of the earliest event [time]
     integer(int32) :: partner                 !! partner in the earliest event
@@ -37,27 +38,33 @@ module neighbour_search
 
 contains
 
-  !> Finds the earliest contact of a disk with the candidates, if this contact precedes the earliest event that is known so far.
+  !> Finds the earliest contact of a disk with the candidates, if it precedes the earliest event
+  !> found so far.
   !>
-  !> The contact time of two disks is a pure function of the states of the two disks, which are both advanced to the later of their
-  !> clocks. An exchange of the two disks changes at most the signs of the terms in the formula of the contact time. The contact
-  !> time is therefore bit-identical for both disks and for any time of the prediction. The function `wins` defines the order of
-  !> simultaneous contacts. A contact time before `now` results from rounding errors. For example, the distance of two disks after a
-  !> perfectly inelastic collision equals the sum of their radii within rounding errors, and the shift of one disk by a period
-  !> changes these errors. If the contact time is before `now`, the procedure decides whether a contact occurs at the time `now` or
-  !> not at all. The shift of a disk by a period is an event, after which the contact is predicted again. Predictions at later times
-  !> decide in the same way whether the two disks collide.
+  !> The contact time depends only on the states of the two disks, both advanced to the later of
+  !> their clocks. Exchanging the disks changes at most the signs of terms in the formula. The
+  !> contact time is therefore bit-identical for both disks, whenever it is predicted. Simultaneous
+  !> contacts are ordered by `wins`.
   !>
-  !> The root of |dx + dv s| = sigma is s = c/(sqrt(disc) - b). The expression for the root s loses no digits by cancellation if the
-  !> disks are close to contact. The discriminant sigma**2 dv**2 - (dx x dv)**2 loses no digits by cancellation if two distant disks
-  !> graze each other. If two disks approach each other and touch, or overlap because of rounding errors, the disks collide at the
-  !> time `now`.
+  !> Contact times before `now` are rounding errors. After a perfectly inelastic collision, for
+  !> example, the distance of two disks equals the sum of their radii only within rounding errors,
+  !> which change when one disk is shifted by a period. Such a contact occurs at `now` or not at
+  !> all. Later predictions decide in the same way: the shift of a disk is itself an event, after
+  !> which its contacts are predicted anew.
   !>
-  !> A single test, which combines several conditions, excludes most candidates. A candidate is excluded if the root is not real, if
-  !> the root is not earlier than the earliest contact found so far, or if the root is not earlier than the next event of the
-  !> candidate. A contact after the next event of the candidate need not be predicted, because the pair is tested again when the
-  !> candidate executes its next event. If the root is earlier than a time t, then c < -2 b (t - late), where `late` is the later
-  !> clock of the two disks. The inequality for c is tested with a margin that is larger than all rounding errors.
+  !> The contact time s is the first root of |dx + dv s| = sigma. It is calculated as
+  !> s = c/(sqrt(disc) - b), with b = dx . dv and c = dx**2 - sigma**2, which avoids cancellation for
+  !> disks close to contact. The discriminant is calculated as
+  !> disc = sigma**2 dv**2 - (dx x dv)**2, which avoids cancellation for distant disks that graze
+  !> each other. If two approaching disks touch, or overlap owing to rounding errors, they collide at
+  !> `now`.
+  !>
+  !> A single test excludes most candidates. It combines three conditions: the root must be real, it
+  !> must be earlier than the earliest contact found so far, and it must be earlier than the next
+  !> event of the candidate. (A later contact need not be predicted, because the pair is tested again
+  !> at that event.) If the root is earlier than a time t, then c < -2 b (t - late), where `late` is
+  !> the later clock of the two disks. This inequality is tested with a margin larger than all
+  !> rounding errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices that start at 0
     type(tag_t), intent(in) :: tag(*)
@@ -129,7 +136,7 @@ contains
     clock = d%clock; radius = d%radius
   end subroutine read_state
 
-  !> A coordinate of a disk after a flight of duration s. Without gravity the coordinate is calculated with fewer operations.
+  !> Coordinate of a disk after a flight of duration s.
   elemental function moved(x, v, g, s, falling) result(there)
     real(real64), intent(in) :: x, v, g, s
     logical, intent(in) :: falling            !! whether gravity acts; if not, g is zero
@@ -142,7 +149,7 @@ contains
     end if
   end function moved
 
-  !> A velocity component of a disk after a flight of duration s. On a straight path the velocity is constant.
+  !> Velocity component of a disk after a flight of duration s.
   elemental function sped_up(v, g, s, falling) result(after)
     real(real64), intent(in) :: v, g, s
     logical, intent(in) :: falling
@@ -152,7 +159,7 @@ contains
     if (falling) after = flight_velocity(v, g, s)
   end function sped_up
 
-  !> The event that disk i stores.
+  !> The event stored for disk i.
   pure function event_of(disk, i) result(event)
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i
@@ -161,8 +168,8 @@ contains
     event = event_t(disk(i)%event_time, i, disk(i)%partner)
   end function event_of
 
-  !> Whether event a precedes the simultaneous event b. Simultaneous events are ordered by the lower id of the disks involved, then
-  !> by the higher id, which is 0 if only one disk is involved.
+  !> True if event a precedes the simultaneous event b. Simultaneous events are ordered by the lower
+  !> id of the two disks, then by the higher one, which is 0 for events of a single disk.
   pure function wins(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
     type(tag_t), intent(in) :: tag(*)
@@ -174,7 +181,6 @@ contains
     yes = ids_a(1) < ids_b(1) .or. (ids_a(1) == ids_b(1) .and. ids_a(2) < ids_b(2))
   contains
 
-    !> The lower and the higher id of the two disks involved in an event.
     pure function ids_of(event) result(ids)
       type(event_t), intent(in) :: event
       integer(int32) :: ids(2)

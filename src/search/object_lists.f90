@@ -1,54 +1,41 @@
-!> Lists the obstacles and the big disks that reach into each cell. A disk is called big if it is one of a few disks that are much
-!> larger than all others.
+!> Obstacles and big disks that reach into each cell. Big disks are a few disks much larger than all others.
 !>
-!> The width of the cells is chosen for the small disks. A big disk is listed in each cell in which a small disk could touch the big
-!> disk. The entries of a big disk are valid while the disk stays within a margin around its reference position, which is the
-!> position for which the entries were made. The list of a cell contains the big disks that a small disk in the cell may touch. A
-!> prediction for a big disk tests the small disks in the cells along the boundary of the big disk. The cost of a prediction for a
-!> disk depends only on the sizes of nearby disks.
+!> The width of the cells is chosen for the small disks. A big disk is listed in each cell in which a small disk could touch it
+!> while the big disk stays within a margin around its reference position. A prediction for a big disk tests the small disks in the
+!> cells along its boundary. The cost of any prediction therefore depends only on the sizes of nearby disks.
 module object_lists
   use kinds, only: int16, int32, real64
   use cell_faces, only: cell_faces_t, patch_t
   use circles, only: new_circle
   use disks, only: disk_t
+  use grid, only: cell_lists_t, split_block
   use partners, only: obstacle_code
   use shapes, only: shape_t, spare
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: entry_t, largest_small_radius, place_t, object_lists_t
+  public :: largest_small_radius, place_t, object_lists_t
 
   integer(int32), parameter :: most_big_disks = 256    !! largest number of big disks; each is tested against all other big disks
 
   !> A cell into which an obstacle or a big disk reaches.
   type :: place_t
     integer(int32) :: cell(2) = 0                !! column and row
-    integer(int32) :: image(2) = 0               !! index of the periodic image of the object that reaches into the cell
+    integer(int32) :: image(2) = 0               !! index of the object's periodic image that reaches into the cell
   end type place_t
-
-  !> An entry in the list of a cell: an obstacle or a big disk.
-  type :: entry_t
-    integer(int32) :: code = 0                   !! index of a big disk (> 0), or code of an obstacle (<= 0)
-    integer(int32) :: image(2) = 0
-    integer(int32) :: next = 0                   !! next entry in the same list; 0 at the end of the list
-  end type entry_t
 
   type :: big_disk_t
     integer(int32) :: disk = 0                   !! index of the disk
     real(real64) :: centre(2) = 0.0_real64       !! reference position [length]
     type(place_t), allocatable :: rim(:)         !! cells in which small disks may touch the big disk
-    integer(int32), allocatable :: obstacles(:)  !! codes of the obstacles that the big disk may touch, in descending order
+    integer(int32), allocatable :: obstacles(:)  !! boundary ids of the obstacles that the big disk may touch, in descending order
   end type big_disk_t
 
-  type :: object_lists_t
+  !> In each list obstacles come first, in ascending order of their indices.
+  type, extends(cell_lists_t) :: object_lists_t
     type(big_disk_t), allocatable :: big(:)
     real(real64) :: margin = 0.0_real64          !! margin around the reference positions of big disks [length]
-    !> (columns,rows) first entry in the list of each cell; 0 for an empty list. The array is not allocated if there are neither
-    !> obstacles nor big disks.
-    integer(int32), allocatable :: first(:, :)
-    type(entry_t), allocatable :: entry(:)
-    integer(int32), private :: vacant = 0        !! first entry in the list of free entries
-    type(patch_t), private :: patch              !! patch of cells for which the lists of obstacles were made
+    type(patch_t), private :: patch              !! block of cells for which the lists of obstacles were made
     !> Lower left and upper right corner of the rectangle that contains all cells of the box [length]
     real(real64), private :: span(2, 2) = 0.0_real64
   contains
@@ -64,8 +51,8 @@ module object_lists
 
 contains
 
-  !> The radius that determines the width of the cells: the largest radius of all disks, or the largest radius of the small disks if
-  !> a few disks are much bigger.
+  !> Radius that determines the width of the cells: the largest of all radii, or that of the small disks if a few disks are much
+  !> bigger.
   pure function largest_small_radius(disk) result(radius)
     type(disk_t), intent(in) :: disk(:)
     real(real64) :: radius, next
@@ -80,7 +67,7 @@ contains
     end do
   end function largest_small_radius
 
-  !> Whether the lists of obstacles have already been made for the cells of the given patch.
+  !> True if the lists of obstacles were made for the cells of the given block.
   pure function serves(self, patch, faces) result(yes)
     class(object_lists_t), intent(in) :: self
     type(patch_t), intent(in) :: patch
@@ -91,7 +78,7 @@ contains
     if (yes) yes = self%patch%equals(patch) .and. all(abs(span_of(patch, faces) - self%span) <= 0)
   end function serves
 
-  !> The lower left and the upper right corner of the rectangle that contains all cells of the box.
+  !> Lower left and upper right corner of the rectangle that contains all cells of the box.
   pure function span_of(patch, faces) result(span)
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
@@ -101,7 +88,7 @@ contains
     call faces%rectangle(patch%whole, patch%whole, other, span(:, 2))
   end function span_of
 
-  !> Makes the lists of obstacles and big disks. Big disks are disks for which the cells are not wide enough.
+  !> Lists obstacles and big disks: the disks that are too large for the width of the cells.
   subroutine renew(self, sim, patch, faces)
     class(object_lists_t), intent(out) :: self
     type(simulation_t), intent(in) :: sim
@@ -112,8 +99,7 @@ contains
 
     if (sim%box%has_obstacles() .or. any(sim%disk%radius > patch%small)) then
       self%margin = 0.5_real64*minval(faces%width)
-      allocate (self%first(patch%n(1), patch%n(2)), source=0_int32)
-      allocate (self%entry(0))
+      call self%open(patch%n)
       self%patch = patch
       self%span = span_of(patch, faces)
     end if
@@ -138,7 +124,8 @@ contains
       end do
       deallocate (self%big)
     end if
-    associate (disks => pack([(i, i=1, sim%n_disks())], sim%disk%radius > patch%small))
+    associate (disks => pack([(i, i=1, sim%n_disks())], &
+      [(sim%disk(i)%radius > patch%small .and. sim%is_inside(i), i=1, sim%n_disks())]))
       allocate (self%big(size(disks)))
       self%big%disk = disks
     end associate
@@ -148,7 +135,7 @@ contains
     end do
   end subroutine renew_big
 
-  !> The cells in which small disks may touch big disks.
+  !> Cells in which small disks may touch big disks.
   pure function rims(self) result(places)
     class(object_lists_t), intent(in) :: self
     type(place_t), allocatable :: places(:)
@@ -160,7 +147,8 @@ contains
     end do
   end function rims
 
-  !> Index of the first entry in the list of a cell; 0 if neither an obstacle nor a big disk reaches into the cell.
+  !> Index of the first entry in the list of a cell; 0 if neither an obstacle nor a big disk reaches
+  !> into it.
   pure function first_in(self, cell) result(e)
     class(object_lists_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)          !! column and row, counted from 1
@@ -170,7 +158,7 @@ contains
     if (allocated(self%first)) e = self%first(cell(1), cell(2))
   end function first_in
 
-  !> Whether any obstacle or big disk reaches into a cell.
+  !> True if any obstacle or big disk reaches into a cell.
   pure function has_any(self, cell) result(yes)
     class(object_lists_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)          !! column and row, counted from 1
@@ -179,7 +167,7 @@ contains
     yes = self%first_in(cell) > 0
   end function has_any
 
-  !> Index of disk i among the big disks; 0 if disk i is not a big disk.
+  !> Index of disk i among the big disks; 0 if it is not big.
   pure function number_of(self, i) result(k)
     class(object_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -190,7 +178,8 @@ contains
     end do
   end function number_of
 
-  !> Makes the present position of the k-th big disk its reference position, and renews the entries of this disk in the lists.
+  !> Takes the present position of the k-th big disk as its reference position, and renews its
+  !> entries in the lists.
   subroutine follow(self, sim, k, patch, faces)
     class(object_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -207,8 +196,8 @@ contains
     end associate
   end subroutine follow
 
-  !> Codes of the obstacles that reach into the given cells, in descending order. If a big disk touches an obstacle, the point of
-  !> contact is in a cell into which both the big disk and the obstacle reach.
+  !> Boundary ids, in descending order, of the obstacles that reach into the given cells. If these are all cells into which a big
+  !> disk reaches, the result includes every obstacle that it can touch, because both reach into the cell of their point of contact.
   pure function obstacles_along(self, places) result(codes)
     class(object_lists_t), intent(in) :: self
     type(place_t), intent(in) :: places(:)
@@ -253,12 +242,12 @@ contains
 
   contains
 
-    !> Adds the cells of a block in which a small disk may touch the outline of the shape. The block is halved recursively until the
-    !> block is a single cell, or until the outline does not cross the block.
+    !> Adds the cells of a block in which a small disk may touch the outline of the shape. The block is halved recursively until it
+    !> is a single cell, or lies completely on one side of the outline.
     recursive subroutine search_block(low, high)
       integer(int32), intent(in) :: low(2), high(2)  !! first and last column and row
       real(real64) :: lower(2), upper(2), beyond(2), half(2), d(2)
-      integer(int32) :: cell(2), last(2), first(2), axis
+      integer(int32) :: cell(2), last(2), first(2)
 
       call faces%rectangle(low, patch%whole, lower, beyond)
       call faces%rectangle(high, patch%whole, beyond, upper)
@@ -266,11 +255,7 @@ contains
       d = 0.5_real64*(lower + upper) - middle
       if (.not. shape%reaches(d, half, patch%small) .or. shape%covers(d, half, 0.0_real64)) return
       if (any(high > low)) then
-        axis = merge(1, 2, high(1) - low(1) >= high(2) - low(2))
-        last = high
-        last(axis) = low(axis) + (high(axis) - low(axis))/2
-        first = low
-        first(axis) = last(axis) + 1
+        call split_block(low, high, last, first)
         call search_block(low, last)
         call search_block(first, high)
         return
@@ -283,36 +268,15 @@ contains
     end subroutine search_block
   end subroutine find_places
 
-  !> Appends an obstacle or a big disk to the lists of some cells. In each list obstacles come first, in ascending order of their
-  !> indices.
+  !> Appends an obstacle or a big disk to the lists of some cells.
   pure subroutine enter(self, code, places)
     class(object_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code
     type(place_t), intent(in) :: places(:)
-    type(entry_t), allocatable :: more(:)
-    integer(int32) :: e, last, m, n
+    integer :: m
 
-    do m = 1, size(places, kind=int32)
-      if (self%vacant == 0) then
-        n = size(self%entry, kind=int32)
-        allocate (more(2*n + 64))
-        more(:n) = self%entry
-        more(n + 1:)%next = [(e, e=n + 2, size(more, kind=int32)), 0]
-        call move_alloc(more, self%entry)
-        self%vacant = n + 1
-      end if
-      e = self%vacant
-      self%vacant = self%entry(e)%next
-      self%entry(e) = entry_t(code, places(m)%image)
-      associate (first => self%first(places(m)%cell(1), places(m)%cell(2)))
-        last = first
-        if (first == 0) first = e
-      end associate
-      if (last == 0) cycle
-      do while (self%entry(last)%next > 0)
-        last = self%entry(last)%next
-      end do
-      self%entry(last)%next = e
+    do m = 1, size(places)
+      call self%append(places(m)%cell, code, places(m)%image)
     end do
   end subroutine enter
 
@@ -321,21 +285,10 @@ contains
     class(object_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code
     type(place_t), intent(in) :: places(:)
-    integer(int32) :: e, before, m
+    integer :: m
 
-    do m = 1, size(places, kind=int32)
-      associate (first => self%first(places(m)%cell(1), places(m)%cell(2)))
-        before = 0
-        e = first
-        do while (self%entry(e)%code /= code)
-          before = e
-          e = self%entry(e)%next
-        end do
-        if (before == 0) first = self%entry(e)%next
-        if (before > 0) self%entry(before)%next = self%entry(e)%next
-      end associate
-      self%entry(e)%next = self%vacant
-      self%vacant = e
+    do m = 1, size(places)
+      call self%remove(places(m)%cell, code)
     end do
   end subroutine leave
 

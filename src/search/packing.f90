@@ -1,12 +1,13 @@
-!> A packing is a set of placed disks. The module can test whether another disk fits between the placed disks, and can find the
-!> first disk that a moving disk touches. Each species has its own grid of cells. The disks of one species have similar radii. The
-!> cost of a search therefore does not depend on the radii of other species.
+!> A set of placed disks. Tests whether a further disk fits between them, and finds the first disk
+!> that a moving disk touches. Each species has its own grid of cells, because its radii are
+!> similar; the cost of a search then does not depend on the radii of other species.
 module packing
+  use grid, only: grid_t
   use images, only: images_t
   use kinds, only: int32, real64
   use memory_hints, only: prefetch
   use obstacle_cells, only: obstacle_cells_t
-  use partners, only: obstacle_code, obstacle_number
+  use partners, only: obstacle_number
   use box_geometry, only: box_t
   use shapes, only: spare
   implicit none
@@ -14,19 +15,16 @@ module packing
   public :: packing_t
 
   !> The grid of cells of one species.
-  type :: layer_t
+  type, extends(grid_t) :: layer_t
     real(real64) :: radius = 0.0_real64             !! largest radius of the disks of the species [length]
     integer(int32) :: count = 0                     !! number of disks of the species to be placed
-    real(real64) :: lower(2) = 0.0_real64           !! corners of a rectangle that contains all centres [length]
-    real(real64) :: upper(2) = 0.0_real64
-    real(real64) :: density(2) = 0.0_real64         !! number of cells per length along each axis [1/length]
-    integer :: n(2) = 0                             !! numbers of columns and rows
+    real(real64) :: upper(2) = 0.0_real64           !! upper right corner [length]
     real(real64) :: width = 0.0_real64              !! smaller edge of a cell [length]
     integer(int32), allocatable :: head(:, :)       !! first disk in each cell; 0 if the cell is empty
   end type layer_t
 
-  !> A placed disk. All data of a disk are stored in one record, so that the access to a disk reads only one cache line. Disks that
-  !> are close in space are usually far apart in memory.
+  !> A placed disk, stored as one record: neighbours in space are usually far apart in memory, and a
+  !> record costs a single cache line.
   type :: placed_t
     real(real64) :: x(2) = 0.0_real64               !! centre [length]
     real(real64) :: radius = 0.0_real64             !! [length]
@@ -39,8 +37,7 @@ module packing
     type(images_t), private :: images               !! images of the box
     type(placed_t), allocatable :: disk(:)          !! (n)
     type(layer_t), allocatable :: layer(:)          !! (number of species)
-    !> Lists of nearby obstacles for each cell. The lists are valid for disks up to the largest radius that was passed to
-    !> `open_species`.
+    !> Obstacles near each cell, listed for disks up to the largest radius passed to `open_species`.
     type(obstacle_cells_t) :: near
   contains
     procedure :: open_all_species
@@ -74,8 +71,8 @@ contains
     allocate (packing%disk(n_disks), packing%layer(n_species))
   end function empty_packing
 
-  !> Sets up the cells of a species. The edge of a cell is the largest diameter of the species, or longer if the species has few
-  !> disks.
+  !> Sets up the cells of a species. Their edge is its largest diameter, or longer if the species
+  !> has few disks.
   subroutine open_species(self, s, radius, count, lower, upper)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: s
@@ -84,21 +81,18 @@ contains
     !> Corners of a rectangle that contains the centres of all disks of the species [length]
     real(real64), intent(in) :: lower(2), upper(2)
     real(real64) :: side, extent(2), few
-    integer :: n(2)
+    integer(int32) :: n(2)
 
     call self%near%serve(self%box, radius)
     extent = upper - lower
     few = 2.0_real64*count
     side = max(2*radius, sqrt(extent(1)*extent(2)/few), maxval(extent)/few)
-    n = max(int(extent/side), 1)
+    n = max(int(extent/side, int32), 1)
     associate (layer => self%layer(s))
       layer%radius = radius
       layer%count = count
-      layer%lower = lower
+      call layer%divide(lower, extent, n)
       layer%upper = upper
-      layer%density = 0
-      where (extent > 0) layer%density = n/extent
-      layer%n = n
       layer%width = minval(extent/n)
       if (allocated(layer%head)) deallocate (layer%head)
       allocate (layer%head(n(1), n(2)), source=0_int32)
@@ -128,7 +122,7 @@ contains
     real(real64), intent(in) :: radius              !! [length]
     integer :: c(2)
 
-    c = cell(self%layer(s), p)
+    c = self%layer(s)%cell(p)
     self%disk(k)%x = p
     self%disk(k)%radius = radius
     self%disk(k)%species = s
@@ -136,7 +130,7 @@ contains
     self%layer(s)%head(c(1), c(2)) = k
   end subroutine add
 
-  !> Removes disk k from its cell. The record of the disk keeps its position and radius.
+  !> Removes disk k from its cell, but keeps its position and radius.
   pure subroutine remove(self, k)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: k
@@ -144,7 +138,7 @@ contains
     integer :: c(2)
 
     associate (me => self%disk(k))
-      c = cell(self%layer(me%species), me%x)
+      c = self%layer(me%species)%cell(me%x)
       associate (head => self%layer(me%species)%head(c(1), c(2)))
         if (head == k) then
           head = me%next
@@ -159,7 +153,8 @@ contains
     end associate
   end subroutine remove
 
-  !> Moves disk k along an axis, without a test for overlaps. The distance must not exceed the period of a periodic axis.
+  !> Moves disk k along an axis, without a test for overlaps. The distance must not exceed the
+  !> period of a periodic axis.
   pure subroutine shift(self, k, axis, distance)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: k
@@ -174,26 +169,28 @@ contains
         if (p(axis) >= box%upper(axis)) p(axis) = max(p(axis) - (box%upper(axis) - box%lower(axis)), box%lower(axis))
         if (p(axis) < box%lower(axis)) p(axis) = min(p(axis) + (box%upper(axis) - box%lower(axis)), box%upper(axis))
       end if
-      if (all(cell(self%layer(me%species), p) == cell(self%layer(me%species), me%x))) then
-        me%x = p
-        return
-      end if
+      associate (layer => self%layer(me%species))
+        if (all(layer%cell(p) == layer%cell(me%x))) then
+          me%x = p
+          return
+        end if
+      end associate
     end associate
     call self%remove(k)
     call self%add(k, self%disk(k)%species, p, self%disk(k)%radius)
   end subroutine shift
 
-  !> Finds the first disk that disk k touches when disk k moves along an axis while all other disks are at rest. On a periodic axis,
-  !> the grid of each species must extend over the whole period.
+  !> Finds the first disk that disk k touches when it moves along an axis while all others rest. On
+  !> a periodic axis, the grid of each species must extend over the whole period.
   pure subroutine find_contact(self, k, axis, sense, distance, partner)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: k
     integer, intent(in) :: axis                     !! 1 for x, 2 for y
     integer, intent(in) :: sense                    !! 1 for a motion to the right or upwards, -1 for the opposite direction
-    !> Distance up to which the procedure searches. If a disk is touched, the procedure sets this argument to the distance to the
-    !> contact. [length]
+    !> On entry, the distance up to which to search; on return, the distance to the contact, if
+    !> there is one. [length]
     real(real64), intent(inout) :: distance
-    integer(int32), intent(out) :: partner          !! disk that is touched; 0 if no disk is touched
+    integer(int32), intent(out) :: partner          !! disk that is touched; 0 if there is none
     integer :: s
 
     partner = 0
@@ -202,8 +199,8 @@ contains
     end do
   end subroutine find_contact
 
-  !> Like `find_contact`, but searches only the disks of species s. The procedure searches lines of cells perpendicular to the
-  !> motion, one line after another, until disk k cannot reach the next line before the contact that was found.
+  !> Version of `find_contact` for the disks of species s. Lines of cells perpendicular to the
+  !> motion are searched one by one, until the next line is beyond the contact found so far.
   pure subroutine search_ahead(packing, s, k, way, distance, partner)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
@@ -220,7 +217,7 @@ contains
       n = layer%n
       period = packing%box%edges()
       rho = (me%radius + layer%radius)*(1 + spare)
-      start = (me%x - layer%lower)*layer%density    ! position in units of cells
+      start = layer%in_cells(me%x)
       middle = int(min(max(start, 0.0_real64), n - 1.0_real64))
       first = floor(start(across) - rho*layer%density(across))
       last = floor(start(across) + rho*layer%density(across))
@@ -244,7 +241,7 @@ contains
     end associate
   end subroutine search_ahead
 
-  !> Like `find_contact`, but searches only the disks in one cell.
+  !> Version of `find_contact` for the disks in one cell.
   pure subroutine search_contact(packing, k, head, way, period, distance, partner)
     type(packing_t), intent(in) :: packing
     integer(int32), intent(in) :: k, head
@@ -279,13 +276,14 @@ contains
     end associate
   end subroutine search_contact
 
-  !> Finds a disk or an obstacle that excludes the centres of disks of the given radius from the whole rectangle `centre` +- `half`.
-  !> The result `blocker` is the index of the disk, or the code of the obstacle (see `partners`), or 0 if neither a disk nor an
-  !> obstacle excludes the rectangle. With half = 0 the procedure tests whether a disk fits at the point `centre`.
+  !> Finds a disk or an obstacle that excludes the centres of disks of the given radius from the
+  !> whole rectangle `centre` +- `half`; half = 0 tests whether a disk fits at the point `centre`.
+  !> `blocker` is the index of the disk, the boundary id of the obstacle (see `partners`), or 0 if
+  !> there is none.
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
-    !> Radius of the disks; at most the largest radius that was passed to `open_species` [length]
+    !> Radius of the disks; at most the largest radius passed to `open_species` [length]
     real(real64), intent(in) :: radius
     integer(int32), intent(out) :: blocker
     real(real64) :: rho
@@ -294,7 +292,7 @@ contains
 
     e = self%near%first_near(centre)
     do while (e > 0)
-      blocker = obstacle_code(self%near%entry(e)%obstacle)
+      blocker = self%near%entry(e)%code
       if (self%covers(blocker, centre, half, radius)) return
       e = self%near%entry(e)%next
     end do
@@ -320,14 +318,14 @@ contains
     integer :: c(2)
 
     associate (layer => self%layer(s))
-      c = cell(layer, p)
+      c = layer%cell(p)
       call prefetch(layer%head(c(1), max(c(2) - 1, 1)))
       call prefetch(layer%head(c(1), c(2)))
       call prefetch(layer%head(c(1), min(c(2) + 1, layer%n(2))))
     end associate
   end subroutine load_cells
 
-  !> Prefetches, for each cell around a point, the disk that was added last to the cell.
+  !> Prefetches, for each cell around a point, the disk added last.
   subroutine load_disks(self, s, p)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: s
@@ -335,7 +333,7 @@ contains
     integer :: c(2), i, j
 
     associate (layer => self%layer(s))
-      c = cell(layer, p)
+      c = layer%cell(p)
       do j = max(c(2) - 1, 1), min(c(2) + 1, layer%n(2))
         do i = max(c(1) - 1, 1), min(c(1) + 1, layer%n(1))
           call prefetch(self%disk(max(layer%head(i, j), 1_int32))%x(1))
@@ -344,33 +342,32 @@ contains
     end associate
   end subroutine load_disks
 
-  !> Finds a disk of species s that excludes the centres of disks of the given radius from the whole rectangle p +- half. If no disk
-  !> of the species excludes the whole rectangle, `blocker` is set to 0. The cell that contains the point p is searched first,
-  !> because a disk in this cell is most likely to exclude the rectangle.
+  !> Finds a disk of species s that excludes the centres of disks of the given radius from the whole
+  !> rectangle p +- half, or sets `blocker` to 0. The search starts in the cell that contains p,
+  !> which is the most likely to hold such a disk.
   pure subroutine search_layer(packing, s, p, half, radius, blocker)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
     real(real64), intent(in) :: p(2), half(2), radius
     integer(int32), intent(out) :: blocker
     real(real64) :: rho
-    integer :: middle(2), low(2), high(2), i, j
+    integer(int32) :: middle(2), corner(2, 2), i, j
 
     blocker = 0
     rho = radius + packing%layer(s)%radius
     associate (layer => packing%layer(s))
       if (any(p + rho < layer%lower .or. p - rho > layer%upper)) return
-      middle = cell(layer, p)
+      middle = layer%cell(p)
       blocker = blocker_in(packing, layer%head(middle(1), middle(2)), p, half, radius)
       if (blocker > 0) return
-      if (rho <= layer%width) then                  ! a search in the neighbouring cells is usually sufficient
-        low = max(middle - 1, 1)
-        high = min(middle + 1, layer%n)
+      if (rho <= layer%width) then                  ! a search in the neighbouring cells is usually enough
+        corner(:, 1) = max(middle - 1, 1)
+        corner(:, 2) = min(middle + 1, layer%n)
       else
-        low = cell(layer, p - rho)
-        high = cell(layer, p + rho)
+        corner = layer%block(p, rho)
       end if
-      do j = low(2), high(2)
-        do i = low(1), high(1)
+      do j = corner(2, 1), corner(2, 2)
+        do i = corner(1, 1), corner(1, 2)
           blocker = blocker_in(packing, layer%head(i, j), p, half, radius)
           if (blocker > 0) return
         end do
@@ -378,7 +375,7 @@ contains
     end associate
   end subroutine search_layer
 
-  !> Like `search_layer`, but searches only the disks in one cell.
+  !> Version of `search_layer` for the disks in one cell.
   pure function blocker_in(packing, head, p, half, radius) result(blocker)
     type(packing_t), intent(in) :: packing
     integer(int32), intent(in) :: head
@@ -394,8 +391,8 @@ contains
     end do
   end function blocker_in
 
-  !> Lists all disks whose boundary is within the distance `reach` of a point. The list may also contain more distant disks, because
-  !> all disks in the searched cells are listed.
+  !> Lists all disks whose boundary is within the distance `reach` of a point, and possibly more
+  !> distant ones, because whole cells are listed.
   subroutine list_neighbours(self, p, reach, list, n)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: p(2), reach         !! [length]
@@ -419,15 +416,13 @@ contains
     !> Appends to the list all disks of species s in cells within the distance rho of a point.
     subroutine append_cells(p, rho)
       real(real64), intent(in) :: p(2), rho
-      integer :: low(2), high(2), i, j
-      integer(int32) :: k
+      integer(int32) :: corner(2, 2), i, j, k
 
       associate (layer => self%layer(s))
         if (any(p + rho < layer%lower .or. p - rho > layer%upper)) return
-        low = cell(layer, p - rho)
-        high = cell(layer, p + rho)
-        do j = low(2), high(2)
-          do i = low(1), high(1)
+        corner = layer%block(p, rho)
+        do j = corner(2, 1), corner(2, 2)
+          do i = corner(1, 1), corner(1, 2)
             k = layer%head(i, j)
             do while (k > 0)
               if (n == size(list)) list = [list, list]
@@ -441,11 +436,11 @@ contains
     end subroutine append_cells
   end subroutine list_neighbours
 
-  !> Whether the given disk or obstacle excludes the centres of disks of the given radius from the whole rectangle `centre` +-
-  !> `half`.
+  !> True if the given disk or obstacle excludes the centres of disks of the given radius from the
+  !> whole rectangle `centre` +- `half`.
   pure function covers(self, by, centre, half, radius) result(yes)
     class(packing_t), intent(in) :: self
-    integer(int32), intent(in) :: by                !! index of the disk (> 0), or code of the obstacle
+    integer(int32), intent(in) :: by                !! index of the disk (> 0), or boundary id of the obstacle
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
     real(real64), intent(in) :: radius              !! [length]
     real(real64) :: corner(2)
@@ -471,19 +466,8 @@ contains
     d = d + self%images%shift(self%images%nearest_image(d))
   end function separation
 
-  !> The cell that contains a point, or the nearest cell if the point is outside the grid.
-  pure function cell(layer, p) result(c)
-    type(layer_t), intent(in) :: layer
-    real(real64), intent(in) :: p(2)
-    integer :: c(2)
-    real(real64) :: column_row(2)
-
-    column_row = max((p - layer%lower)*layer%density, 0.0_real64)
-    c = 1 + int(min(column_row, layer%n - 1.0_real64))
-  end function cell
-
-  !> First and last index, along each axis, of the periodic images of a point that can be within the distance rho of a disk in the
-  !> box.
+  !> First and last index, along each axis, of the periodic images of a point that can be within the
+  !> distance rho of a disk in the box.
   pure subroutine range_images(box, p, rho, first, last)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: p(2), rho

@@ -1,11 +1,11 @@
-!> Lists the disks that a piston may touch in the near future. In the course of time, a piston can reach every disk in the box.
-!> Before the piston has moved by the width of a cell, the piston can touch only disks in a strip of adjacent columns or rows of
-!> cells (`cell_faces: find_strips`). Contacts with a piston are therefore predicted only for the disks in the strip of the piston.
+!> Disks that a piston may touch in the near future. A piston can eventually reach every disk in the
+!> box. Until it has moved by the width of a cell, however, it can touch only disks in a strip of
+!> adjacent columns or rows of cells (`cell_faces: find_strips`). Contacts with a piston are
+!> therefore predicted only for the disks in its strip.
 module piston_strips
   use kinds, only: int16, int32, real64
   use cell_grid, only: cell_grid_t
   use partners, only: n_sides
-  use side_motion, only: piston
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -13,7 +13,7 @@ module piston_strips
 
 contains
 
-  !> Lists the disks that a piston may touch before the piston leaves its strip.
+  !> Lists the disks that a piston may touch before it leaves its strip.
   function near_piston(self, k) result(disks)
     class(cell_grid_t), intent(in) :: self
     integer, intent(in) :: k                       !! index of the side
@@ -60,24 +60,26 @@ contains
     end subroutine add
   end function near_piston
 
-  !> Finds the new strip of a piston that leaves its strip. The procedure lists the disks in the old and new strips, because their
-  !> events have to be predicted again.
+  !> Finds the new strip of a piston that is leaving its present one, and lists the disks in both
+  !> strips, whose events must be predicted anew.
   subroutine change_strips(self, sim, disks)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), allocatable, intent(out) :: disks(:)
     real(real64) :: now                            ! a copy, because `find_strips` changes the component `due`
+    logical :: pushed(n_sides)
     integer(int32) :: i
     integer :: k
 
+    pushed = sim%box%side%is_piston()
     now = self%faces%due
     allocate (disks(0))
     do k = 1, n_sides
-      if (sim%box%surface(k)%motion%kind == piston) disks = [disks, near_piston(self, k)]
+      if (pushed(k)) disks = [disks, near_piston(self, k)]
     end do
     call self%faces%find_strips(sim%box, self%patch%small, now)
     do k = 1, n_sides
-      if (sim%box%surface(k)%motion%kind == piston) disks = [disks, near_piston(self, k)]
+      if (pushed(k)) disks = [disks, near_piston(self, k)]
     end do
     if (.not. self%lists%used) return
     do i = 1, size(disks, kind=int32)

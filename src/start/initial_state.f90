@@ -1,13 +1,12 @@
 !> Creates the simulation that an input describes, with all disks at their initial positions and with their initial velocities.
 module initial_state
   use kinds, only: int32, real64
-  use drive, only: active
+  use disks, only: disks_before
   use errors, only: error_t
+  use initial_positions, only: place_disks
   use input_groups, only: range_of
   use input_problems, only: problem_list_t
-  use kicks, only: draw_orientations
-  use placement, only: place_disks
-  use settings, only: run_input_t, settings_t
+  use settings, only: run_input_t, settings_t, species_settings_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: written
@@ -16,20 +15,19 @@ module initial_state
   private
   public :: check_speeds, create_simulation, describe_system
 
-  !> Largest magnitude of a number that the program may square; double precision can represent numbers up to about 1e308.
+  !> Largest magnitude of a number that the program squares; double precision ends at about 1e308.
   real(real64), parameter :: most = 1.0e130_real64
   real(real64), parameter :: widest = 1.0e30_real64*(1 + 1.0e-12_real64)   !! largest ratio of two masses
 
 contains
 
-  !> Creates the simulation that the input describes. The procedure deallocates the tables of disks that were read from files.
+  !> Creates the simulation described by the input, and deallocates the tables of disks read from files.
   subroutine create_simulation(input, line, sim, error, unrelaxed)
     type(run_input_t), intent(inout) :: input
     class(status_line_t), intent(inout) :: line             !! status line that shows the progress of the placement
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
-    !> .true. to leave out the placement of species with placement = 'relaxed', because a test of the input (--check) needs no
-    !> positions
+    !> .true. to skip the placement of 'relaxed' species; a mere check of the input (--check) needs no positions
     logical, intent(in), optional :: unrelaxed
     type(problem_list_t) :: problems
     logical :: without_placement
@@ -42,7 +40,8 @@ contains
     associate (settings => input%settings, groups => input%groups(s(1):s(2)))
       call describe_system(settings, sim)
       call sim%list_disks()
-      if (sim%drive%kind == active) call draw_orientations(sim)
+      call let_wait(settings%species, sim)
+      if (allocated(sim%drive)) call sim%drive%prepare(sim)
       call place_disks(settings%species, groups, settings%run%seed, without_placement, line, sim, problems)
       if (problems%count == 0) call draw_initial_velocities(settings, groups, sim, problems)
       if (problems%count == 0) call check_speeds(sim, problems)
@@ -51,8 +50,23 @@ contains
     call problems%report(input%path, error, input%overrides)
   end subroutine create_simulation
 
-  !> Reports an error if a product of lengths, speeds and masses in the prediction or execution of collisions could overflow or
-  !> underflow, because the simulation would then miss collisions.
+  !> Marks the last disks of each species that wait outside of the box at the start.
+  pure subroutine let_wait(species, sim)
+    type(species_settings_t), intent(in) :: species(:)
+    type(simulation_t), intent(inout) :: sim                !! simulation with its disks in the order of the input
+    integer :: s
+
+    if (.not. allocated(sim%waits)) return
+    do s = 1, size(species)
+      associate (last => disks_before(species, s + 1), n => species(s)%waiting)
+        sim%waits(last - n + 1:last) = .true.
+        sim%tally%inside(s) = species(s)%count - n
+      end associate
+    end do
+  end subroutine let_wait
+
+  !> Reports an error if products of lengths, speeds and masses in the prediction or execution of collisions could overflow or
+  !> underflow, which would make the simulation miss collisions.
   subroutine check_speeds(sim, problems)
     type(simulation_t), intent(in) :: sim
     type(problem_list_t), intent(inout) :: problems
@@ -89,6 +103,7 @@ contains
     sim%system_t = settings%system_t
     sim%seed = settings%run%seed
     sim%species = settings%species%species_t
+    if (allocated(settings%schedule)) sim%schedule = settings%schedule
   end subroutine describe_system
 
 end module initial_state

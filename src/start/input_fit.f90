@@ -1,10 +1,13 @@
-!> Checks the geometry of the system that an input describes: obstacles and regions must lie inside the box, and the disks must fit
-!> into their regions. Each problem is reported with the number of the line of the input file that causes the problem.
+!> Checks the geometry of the system: obstacles and regions must lie inside the box, and the disks must fit into their regions. Each
+!> problem is reported with the line of the input file that causes it.
 module input_fit
-  use kinds, only: int32, int64, pi, real64
+  use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t
   use box_sides, only: bounds, spans
+  use drives, only: counting_drives, drive_counters
+  use entries, only: check_source
   use errors, only: exit_files
+  use group_fields, only: group_fields_t
   use input_groups, only: group_t, range_of
   use input_problems, only: most_problems, problem_list_t
   use input_surfaces, only: has_many
@@ -13,8 +16,8 @@ module input_fit
   use partners, only: n_sides, side_name
   use position_file, only: angle_row, radius_row, spin_row
   use radii, only: drawn_radii
+  use sample_values, only: all_columns, frame_column_t, has_columns
   use settings, only: settings_t, species_settings_t
-  use side_motion, only: piston, constant_velocity
   use starting_disks, only: read_disks, resolution
   use texts, only: place_of, written
   use variables, only: most_disks, obstacle_groups
@@ -23,10 +26,9 @@ module input_fit
   public :: check_fit, report_file_problem, complete_settings
 
   real(real64), parameter, public :: rounding = 1.0e-12_real64        !! relative tolerance for disks that touch
-  real(real64), parameter :: random_limit = 0.547_real64      !! packing fraction at which random sequential insertion saturates
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! packing fraction of the triangular lattice
-  !> Ratio of the smallest to the largest radius above which disks of different sizes cannot be packed more densely than disks of
-  !> equal size (Blind, 1969, see `densest_packing`)
+  !> Ratio of the smallest to the largest radius above which disks of different sizes cannot be
+  !> packed more densely than equal disks (Blind, 1969, see `densest_packing`)
   real(real64), parameter :: nearly_equal = 0.743_real64
 
   !> Area and range of radii of the disks of a species.
@@ -37,12 +39,12 @@ module input_fit
 
 contains
 
-  !> Completes the settings with values from starting files and with the drawn radii, and determines the features of the run.
+  !> Completes the settings with the contents of initial-configuration files and the random radii, and determines the features of
+  !> the run.
   subroutine complete_settings(settings, groups, problems, complete)
     type(settings_t), intent(inout) :: settings
     type(group_t), intent(inout) :: groups(:)
-    !> Problems of the input. The procedure adds a problem for each starting file that cannot be read, and a problem if the memory
-    !> is too small.
+    !> Problems of the input; the procedure adds unreadable files and insufficient memory.
     type(problem_list_t), intent(inout) :: problems
     logical, intent(out) :: complete                          !! .false. if the number of disks is too large or the box is invalid
     integer :: s(2), k, before
@@ -55,7 +57,7 @@ contains
     end do
     call settings%choose_features()
     call check_columns(settings, groups(place_of("output", groups%name)), problems)
-    if (settings%n_disks() > most_disks) return               ! another procedure reports an excessive number of disks
+    if (settings%n_disks() > most_disks) return               ! an excessive number of disks is reported elsewhere
     before = problems%count
     call check_memory(settings, problems)
     if (problems%count > before) return
@@ -65,41 +67,42 @@ contains
     complete = .true.
   end subroutine complete_settings
 
-  !> Reports requested columns of the frames that the run does not have, such as orientations of disks that do not rotate. The
-  !> columns are checked after the starting files have been read, because a starting file can determine whether the disks rotate.
+  !> Reports requested columns of frames that the run does not have, such as orientations of disks that do not rotate. The check
+  !> follows the reading of initial-configuration files, because their contents can determine whether disks rotate.
   subroutine check_columns(settings, group, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: group                        !! the group `output`
     type(problem_list_t), intent(inout) :: problems
 
+    type(frame_column_t) :: column
+    integer :: k
+
     if (.not. allocated(settings%output%frame_columns)) return
-    call need("image", any(settings%box%periodic), "a periodic axis (box.boundary)")
-    call need("angular_velocity", settings%features%rotation, "disks that rotate, for example by contact.tangential_restitution")
-    call need("orientation", settings%features%orientation, &
-      "disks that rotate, active disks, or a starting file with orientations")
-    call need("recycled", settings%drive%moves_disks(), "drive.kind = 'recycle'")
-
-  contains
-
-    !> Reports a problem if a requested column of the frames requires a property that the run does not have.
-    subroutine need(column, there, what)
-      character(len=*), intent(in) :: column, what
-      logical, intent(in) :: there                            !! .true. if the run has the property that the column requires
-
-      if (.not. there .and. any(settings%output%frame_columns == column)) &
-        call group%complain("frame_columns", "'"//column//"' needs "//what, problems)
-    end subroutine need
+    associate (lacking => .not. has_columns(settings))
+      do k = 1, size(all_columns)
+        column = all_columns(k)
+        if (column%name == "") then
+          column%name = drive_counters
+          column%needs = "drive.kind = '"//counting_drives//"'"
+        end if
+        if (lacking(k) .and. any(settings%output%frame_columns == column%name)) call group%complain("frame_columns", &
+          "'"//trim(column%name)//"' needs "//trim(column%needs), problems)
+      end do
+    end associate
   end subroutine check_columns
 
-  !> Checks completed settings: whether the obstacles fit into the box, and whether the disks of each species fit into their region.
-  !> Species for which the number or the size of the disks is invalid are skipped, because these errors have already been reported.
-  subroutine check_fit(settings, groups, problems)
+  !> Checks whether the obstacles fit into the box, and the disks of each species into their region. Species with an invalid number
+  !> or size of disks are skipped, because this has been reported before.
+  subroutine check_fit(settings, groups, problems, running)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
+    !> whether the disks are already moving, so that their initial state is not checked
+    logical, intent(in) :: running
     character(len=:), allocatable :: misfit                   ! name of the variable, a colon, and the problem
     real(real64) :: beyond(2, 2)
     type(extent_t) :: extent(size(settings%species))
+    type(group_fields_t) :: fields
     integer :: o(2), s(2), k
 
     o = range_of(groups, obstacle_groups)
@@ -112,92 +115,29 @@ contains
           problems)
         if (problems%count >= most_problems) exit
       end do
-      do k = 1, size(species)
+      do k = 1, merge(0, size(species), running)
         call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems)
       end do
-      if (settings%drive%moves_disks()) call check_recycling(settings, groups(place_of("drive", groups%name)), problems)
+      if (allocated(settings%drive)) then
+        fields = group_fields_t(groups(place_of("drive", groups%name)), problems)
+        call settings%drive%check(fields, box, species%count, species%radius)
+        problems = fields%problems
+      end if
+      o = range_of(groups, ["source"])
+      do k = 1, o(2) - o(1) + 1
+        fields = group_fields_t(groups(o(1) + k - 1), problems)
+        call check_source(settings%source(k), fields, box, species(settings%source(k)%species)%radius)
+        problems = fields%problems
+      end do
       if (problems%count > 0) return
       extent = [(extent_of(species(k), k, settings%run%seed), k=1, size(species))]
-      call check_packing(species, extent, groups(s(1):s(2)), problems)
-      call check_containers(box, sum(extent%area), groups(s(1)), problems)
+      if (.not. running) call check_packing(species, extent, groups(s(1):s(2)), problems)
+      if (.not. running) call check_containers(box, sum(extent%area), groups(s(1)), problems)
       if (problems%count == 0) call check_strokes(box, sum(extent%area), groups, problems)
     end associate
   end subroutine check_fit
 
-  !> Checks the two regions of recycling. Both regions must lie in the box, and they must not overlap each other. The region to
-  !> which disks move must be wide enough for a disk and must not overlap an obstacle.
-  subroutine check_recycling(settings, group, problems)
-    type(settings_t), intent(in) :: settings
-    type(group_t), intent(in) :: group                        !! the group `drive`
-    type(problem_list_t), intent(inout) :: problems
-    real(real64), parameter :: nearly = 1 - 1.0e-4_real64     ! factor below 1, because a region may touch an obstacle
-    real(real64) :: beyond(2, 2), radius, middle(2), half(2)
-    integer :: before, k
-
-    before = problems%count
-    beyond = settings%box%side_excursion()
-    call check_region("from_region", settings%drive%from_region)
-    call check_region("to_region", settings%drive%to_region)
-    if (problems%count > before .or. .not. (group%given("from_region") .and. group%given("to_region"))) return
-    associate (box => settings%box, from => settings%drive%from_region, to => settings%drive%to_region)
-      if (all(from([1, 3]) < to([2, 4]) .and. to([1, 3]) < from([2, 4]))) then
-        call group%complain("to_region", "it overlaps drive.from_region, so that disks would be recycled again and again", problems)
-        return
-      end if
-      radius = maxval(settings%species%radius, mask=settings%drive%acts_on([(k, k=1, size(settings%species))]))
-      half = 0.5_real64*(to([2, 4]) - to([1, 3]))
-      middle = 0.5_real64*(to([1, 3]) + to([2, 4]))
-      if (any(half <= radius .and. .not. spans(to, box))) call group%complain("to_region", &
-        "a disk of diameter "//written(2*radius)//" needs more room; the region is "//written(2*half(1))//" x " &
-        //written(2*half(2)), problems)
-      half = max(half - merge(0.0_real64, radius, spans(to, box)), 0.0_real64)       ! the rectangle for the centres of disks
-      do k = 1, box%n_obstacles()
-        if (.not. is_in_the_way(box, k, middle, nearly*half, nearly*radius)) cycle
-        call group%complain("to_region", 'it overlaps obstacle "'//box%surface(box%obstacle(k)%surface)%name//'"', problems)
-        exit
-      end do
-    end associate
-
-  contains
-
-    !> Reports a region that is empty or extends beyond the box.
-    subroutine check_region(name, region)
-      character(len=*), intent(in) :: name
-      real(real64), intent(in) :: region(4)                   !! xlo, xhi, ylo, yhi [length]
-
-      if (.not. group%given(name) .or. group%faulty(name)) return
-      if (any(region([1, 3]) >= region([2, 4]))) then
-        call group%complain(name, "its lower ends must be below its upper ends; give xlo, xhi, ylo, yhi", problems)
-      else if (any(region([1, 3]) < settings%box%lower - beyond(:, 1) .or. region([2, 4]) > settings%box%upper + beyond(:, 2))) then
-        call group%complain(name, "it extends beyond the box", problems)
-      end if
-    end subroutine check_region
-  end subroutine check_recycling
-
-  !> Whether a disk whose centre is in a rectangle can touch an obstacle, or the obstacle excludes disks from the whole rectangle.
-  pure function is_in_the_way(box, m, middle, half, radius) result(yes)
-    type(box_t), intent(in) :: box
-    integer, intent(in) :: m                                  !! index of the obstacle
-    real(real64), intent(in) :: middle(2), half(2)            !! centre and half edges of the rectangle [length]
-    real(real64), intent(in) :: radius                        !! [length]
-    logical :: yes
-    real(real64) :: d(2)
-    integer :: last(2), kx, ky
-
-    yes = .false.
-    associate (shape => box%obstacle(m)%shape)
-      last = merge(1, 0, box%periodic .and. .not. shape%encloses)
-      do ky = -last(2), last(2)
-        do kx = -last(1), last(1)
-          d = middle + [kx, ky]*box%edges() - shape%middle
-          yes = shape%reaches(d, half, radius) .or. shape%covers(d, half, radius)
-          if (yes) return
-        end do
-      end do
-    end associate
-  end function is_in_the_way
-
-  !> Area and range of radii of the disks of the k-th species.
+  !> Area and range of radii of the disks of the k-th species that are in the box at the start.
   pure function extent_of(species, k, seed) result(extent)
     type(species_settings_t), intent(in) :: species
     integer, intent(in) :: k
@@ -205,18 +145,20 @@ contains
     type(extent_t) :: extent
     real(real64), allocatable :: radius(:)                    ! [length]
 
-    extent = extent_t(species%count*pi*species%radius**2, species%radius, species%radius)
+    extent = extent_t((species%count - species%waiting)*pi*species%radius**2, species%radius, species%radius)
     if (species%radius_in_file) then
       radius = species%in_file%table(radius_row, :)
     else if (species%polydispersity > 0) then
       radius = drawn_radii(species, k, seed)
+      radius = radius(:size(radius) - species%waiting)
     end if
+    if (species%waiting == species%count) return
     if (allocated(radius)) extent = extent_t(pi*sum(radius**2), minval(radius), maxval(radius))
   end function extent_of
 
-  !> Reports a region whose packing fraction would exceed a proven upper bound. No method could place the disks, and some would try
-  !> for a long time. The packing fraction of a region includes the disks of all species that are placed within the region. Given
-  !> positions are not bound to a region.
+  !> Reports a region whose packing fraction, including all species placed within it, would exceed a
+  !> proven upper bound. No method could place these disks, and some would try for a long time.
+  !> Given positions are not bound to a region.
   pure subroutine check_packing(species, extent, groups, problems)
     type(species_settings_t), intent(in) :: species(:)
     type(extent_t), intent(in) :: extent(:)                   !! areas and radii of the disks of each species
@@ -229,7 +171,7 @@ contains
     do k = 1, size(species)
       associate (region => species(k)%region)
         within = [(all(species(j)%region([1, 3]) >= region([1, 3])) .and. all(species(j)%region([2, 4]) <= region([2, 4])) &
-          .and. all(species(j)%placement /= [character(len=8) :: "explicit", "file"]), j=1, size(species))]
+          .and. species(j)%placement%is_bound(), j=1, size(species))]
         packing = sum(extent%area, mask=within)/product(region([2, 4]) - region([1, 3]))
       end associate
       if (.not. within(k)) cycle
@@ -261,12 +203,13 @@ contains
     end do
   end subroutine check_containers
 
-  !> Upper bound of the packing fraction of disks in the plane. The bound also holds for a rectangle with sides and for a periodic
-  !> box, because copies of a rectangle fill the plane. For disks of nearly equal radii the bound is the packing fraction of the
-  !> triangular lattice (Blind, Journal für die reine und angewandte Mathematik 236, 145, 1969). For other radii the bound is the
-  !> packing fraction inside the triangle whose corners are the centres of one largest disk and two smallest disks that touch each
-  !> other (Florian, Rendiconti del Circolo Matematico di Palermo 9, 300, 1960). Fernique (2021, arXiv:2107.14079) reviews the
-  !> bounds of Blind and Florian.
+  !> Upper bound of the packing fraction of disks in the plane. The bound also holds for a rectangular
+  !> box, with walls or periodic: copies of the box fill the plane at the packing fraction of the box.
+  !> For nearly equal radii the bound is the packing fraction of the triangular lattice (Blind,
+  !> Journal für die reine und angewandte Mathematik 236, 145, 1969). For other radii, let one disk of
+  !> the largest and two of the smallest radius touch each other: the bound is the packing fraction
+  !> inside the triangle of their centres (Florian, Rendiconti del Circolo Matematico di Palermo 9,
+  !> 300, 1960). Fernique (2021, arXiv:2107.14079) reviews both results.
   pure function densest_packing(ratio) result(most)
     real(real64), intent(in) :: ratio                         !! smallest radius divided by largest radius
     real(real64) :: most
@@ -275,8 +218,8 @@ contains
     if (ratio < nearly_equal) most = (pi*ratio**2 + 2*(1 - ratio**2)*asin(ratio/(1 + ratio)))/(2*ratio*sqrt(1 + 2*ratio))
   end function densest_packing
 
-  !> Reports an invalid position of an obstacle, with the line of the obstacle in its file or the number of the point in its
-  !> polyline.
+  !> Reports an invalid position of an obstacle, with its line in a file or the number of the point
+  !> in its polyline.
   subroutine report_obstacle_problem(box, m, group, misfit, problems)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: m                           !! index of the obstacle
@@ -297,8 +240,8 @@ contains
     end if
   end subroutine report_obstacle_problem
 
-  !> Reports sides that would crush the disks, because the box would be smaller at the end of the motion than the total area of the
-  !> disks. A box with a piston is not checked, because the disks can push the piston outwards.
+  !> Reports sides that would crush the disks, because their motion would leave a box smaller than the total area of the disks.
+  !> Boxes with a piston are not checked: the disks can push it outwards.
   subroutine check_strokes(box, disks, groups, problems)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: disks                         !! total area of the disks [length**2]
@@ -307,29 +250,30 @@ contains
     real(real64) :: low(2), high(2), last
     integer :: o(2), k, side, axis
 
-    if (any(box%surface(:n_sides)%motion%kind == piston)) return
+    if (any(box%side%is_piston())) return
     o = range_of(groups, ["side"])
     do k = o(1), o(2)
       side = place_of(trim(groups(k)%instance), side_name)
       axis = (side + 1)/2
-      associate (motion => box%surface(side)%motion)
-        if (motion%kind /= constant_velocity .or. motion%prescribed_velocity < 0) cycle
-        call bounds(box, motion%end_time, low, high)
+      if (.not. allocated(box%side(side)%motion)) cycle
+      associate (motion => box%side(side)%motion, end_time => box%side(side)%motion%final_time())
+        if (.not. end_time < never .or. motion%final_velocity() < 0) cycle
+        call bounds(box, end_time, low, high)
         if (product(high - low) > disks) cycle
-        if (.not. motion%prescribed_velocity > 0) then
+        if (motion%stands()) then
           call groups(k)%complain("position", "leaves the disks less than their own area, "//written(disks), problems)
           cycle
         end if
-        last = motion%end_time - (disks/(high(3 - axis) - low(3 - axis)) - (high(axis) - low(axis)))/motion%prescribed_velocity
+        last = end_time - (disks/(high(3 - axis) - low(3 - axis)) - (high(axis) - low(axis)))/motion%final_velocity()
         call groups(k)%complain("end_time", "the side would crush the disks, which need at least their own area, "// &
           written(disks)//"; allowed: a time before "//written(last), problems)
       end associate
     end do
   end subroutine check_strokes
 
-  !> Reads from a starting file the number and the radii of the disks of a species, unless the input contains these values, and
-  !> determines whether the disks rotate. If the input determines the number and the radii of the disks, an unreadable file is
-  !> reported only when the disks are placed, because a resumed run places no disks and does not need the file.
+  !> Determines whether the disks of a species rotate, and reads their number and radii from an initial-configuration file unless
+  !> the input contains both. In this case an unreadable file is not reported here, but only when the disks are placed, because a
+  !> resumed run places no disks and does not need the file.
   subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: k                                  !! index of the species
@@ -354,7 +298,7 @@ contains
       s%angle_in_file = s%in_file%there(angle_row)
       if (.not. decides) return
       associate (radius => s%in_file%table(radius_row, :))
-        s%count = size(radius)
+        s%count = size(radius) + s%waiting
         call group%put_text("count", written(s%count))
         if (s%radius_in_file) s%radius = maxval(radius)
         if (all(s%region([1, 3]) < s%region([2, 4]))) call group%put_reals("packing_fraction", &
@@ -363,7 +307,7 @@ contains
     end associate
   end subroutine read_missing_values
 
-  !> Determines the largest of the radii that the run will draw, and the packing fraction of disks with the drawn radii.
+  !> Determines the largest radius that the run will draw, and the packing fraction of the drawn disks.
   subroutine measure_radii(s, k, seed, group)
     type(species_settings_t), intent(inout) :: s
     integer, intent(in) :: k                                  !! index of the species
@@ -378,7 +322,7 @@ contains
       call group%put_reals("packing_fraction", [pi*sum(radius**2)/product(s%region([2, 4]) - s%region([1, 3]))])
   end subroutine measure_radii
 
-  !> Reports why the disks in a starting file cannot be used.
+  !> Reports why the disks in an initial-configuration file cannot be used.
   subroutine report_file_problem(s, group, problems)
     type(species_settings_t), intent(in) :: s
     type(group_t), intent(in) :: group
@@ -415,7 +359,7 @@ contains
 
   contains
 
-    !> Checks one axis. The region must lie in the box and be wide enough for a disk. A period must exceed two diameters, so that no
+    !> Checks one axis: the region must lie in the box and be wide enough for a disk. A period must exceed two diameters, so that no
     !> disk can touch two images of another disk at the same time.
     subroutine check_axis()
       logical :: endless(2)
@@ -452,20 +396,20 @@ contains
       call group%complain(variable, what//", along "//merge("x", "y", axis == 1), problems)
     end subroutine complain
 
-    !> Checks that the packing fraction does not exceed the packing fraction of the densest possible packing.
+    !> Checks that the packing fraction does not exceed that of the densest possible packing.
     subroutine check_fraction()
       real(real64) :: packing
-      character(len=:), allocatable :: variable, filled
+      character(len=:), allocatable :: variable, filled, shortfall
 
-      packing = s%count*pi*s%radius**2/product(s%region([2, 4]) - s%region([1, 3]))
+      packing = (s%count - s%waiting)*pi*s%radius**2/product(s%region([2, 4]) - s%region([1, 3]))
       variable = "radius"
       if (group%given("packing_fraction")) variable = "packing_fraction"
       filled = "the disks would fill "//written(packing)//" of their region; "
       if (packing > closest_packing*(1 + rounding)) then
         call group%complain(variable, filled//"the closest packing is "//written(closest_packing), problems)
-      else if (packing > random_limit .and. s%placement == "random") then
-        call group%complain(variable, filled//"random placement reaches "//written(random_limit)// &
-          ", placement = 'dense' more", problems)
+      else
+        shortfall = s%placement%shortfall(packing)
+        if (shortfall /= "") call group%complain(variable, filled//shortfall, problems)
       end if
     end subroutine check_fraction
   end subroutine check_species

@@ -1,6 +1,7 @@
 !> Reads disks from the last complete frame in the output of a finished or unfinished run.
 submodule(starting_disks) last_frame
-  use h5md_layout, only: box_group, disk_species, frame_counter, species_names
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+  use h5md_layout, only: box_group, disk_species, frame_counter, presence, species_names, value_of
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: series_t
   use variables, only: most_disks
@@ -40,6 +41,7 @@ contains
     allocate (disks%there(size(datasets)), source=.true.)
     if (size(disks%rows) > 0) then
       call read_rows(1, 2)
+      call check_presence()
       call read_rows(3, 4)
       do row = spin_row, mass_row
         disks%there(row) = file%length(trim(datasets(row))) >= 0
@@ -62,6 +64,17 @@ contains
 
   contains
 
+    !> Reports disks that waited outside of the box in the last frame, where their positions are NaN.
+    subroutine check_presence()
+      integer, allocatable :: absent(:)
+
+      if (file%length(presence//value_of) < 0) return
+      absent = pack(disks%rows, any(ieee_is_nan(disks%table(1:2, :)), dim=1))
+      if (size(absent) == 0 .or. allocated(disks%error)) return
+      call fail(disks%error, exit_usage, path//": in the last frame "//written(size(absent))//" disks of species """//name &
+        //""" are not in the box, the first of them disk "//written(absent(1))//"; a start needs all disks of the species")
+    end subroutine check_presence
+
     !> Reads a range of rows of the table for all disks. Constant quantities, such as radii and masses, are read from datasets
     !> outside the frames.
     subroutine read_rows(first, last)
@@ -80,6 +93,7 @@ contains
         if (frames(1) < 1 .or. frames(1) > series%capacity) call file%check(-1, "be read: "//frame_counter//" is " &
           //written(frames(1)))
         call series%load(file, frames(1), values)
+        call series%close(file)
       end if
       disks%table(first:last, :) = values(:, disks%rows)
     end subroutine read_rows

@@ -1,5 +1,5 @@
-!> Checks the positions of disks that a user has moved in a running simulation. The new positions must obey the same rules as the
-!> initial positions of a run.
+!> Checks the positions of disks that a user has moved in a running simulation, by the same rules as
+!> the initial positions of a run.
 module moved_disks
   use box_sides, only: bounds
   use errors, only: error_t, exit_usage, fail
@@ -20,8 +20,9 @@ contains
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
     type(packing_t) :: packing
-    real(real64) :: x(2, size(sim%disk)), radius(size(sim%disk)), lower(2), upper(2), inset(2), slack
+    real(real64) :: x(2, size(sim%disk)), radius(size(sim%disk)), lower(2), upper(2), inset(2, 2), slack
     integer(int32) :: id(size(sim%disk)), species(size(sim%disk)), i, blocker
+    logical :: passed(2, 2)                                   ! whether a side is periodic or open: (axis, lower or upper side)
 
     id = sim%tag%id
     species(id) = sim%tag%species
@@ -30,12 +31,16 @@ contains
       x(:, id(i)) = sim%position(i)
     end do
     call bounds(sim%box, sim%now, lower, upper)
+    passed = transpose(reshape(sim%box%open, [2, 2])) .or. spread(sim%box%periodic, 2, 2)
     packing = packing_t(sim%box, int(sim%n_disks()), size(sim%species))
     call packing%open_all_species(int(species), radius, minval(x, dim=2), maxval(x, dim=2))
-    do i = 1, sim%n_disks()
+    do i = 1, sim%n_disks()                                   ! the i-th disk in the order of the input
+      if (allocated(sim%waits)) then
+        if (sim%waits(i)) cycle
+      end if
       slack = rounding*(radius(i) + maxval(radius))
-      inset = merge(0.0_real64, radius(i) - slack, sim%box%periodic)
-      if (any(x(:, i) < lower + inset .or. x(:, i) > upper - inset)) then
+      inset = merge(0.0_real64, radius(i) - slack, passed)
+      if (any(x(:, i) < lower + inset(:, 1) .or. x(:, i) > upper - inset(:, 2))) then
         call complain(i, "is not wholly inside the box")
         return
       end if

@@ -1,5 +1,5 @@
-!> Reads the disks of a species from a starting file, in any of the possible formats. Each number in the file is checked, and
-!> quantities that the file does not contain are set to their values in the input.
+!> Reads the disks of one species from an initial-configuration file in any of the supported formats. All numbers of the file are
+!> checked; quantities missing from the file are taken from the input.
 module starting_disks
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: int64, real64
@@ -22,14 +22,14 @@ module starting_disks
     velocity//value_of, velocity//value_of, angular_velocity//value_of, orientation//value_of, disk_radius, disk_mass]
 
   interface
-    !> Reads the disks of one species from the last frame of a run. The submodule `last_frame` reads the disks from the output file;
-    !> the submodule `last_frame_without_hdf5` only reports that HDF5 files cannot be read. The linker selects either `last_frame`
-    !> or `last_frame_without_hdf5`.
+    !> Reads the disks of one species from the last frame of a run. Of the two submodules,
+    !> `last_frame` does so, and `last_frame_without_hdf5` only reports that HDF5 files cannot be
+    !> read; the linker selects one of them.
     module subroutine read_last_frame(path, name, disks, box)
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: name                    !! name of the species
       type(disks_in_file_t), intent(inout) :: disks
-      !> Box to which the positions are scaled; if this argument is absent, the positions are not scaled.
+      !> Box to which the positions are scaled; without it, they are not scaled.
       type(box_t), intent(in), optional :: box
     end subroutine read_last_frame
   end interface
@@ -44,7 +44,8 @@ contains
     yes = index(path//"|", ".h5|") > 0 .or. index(path//"|", ".h5.part|") > 0
   end function is_run
 
-  !> Reads the disks of species s. Radii and masses in the input take precedence over radii and masses in the file.
+  !> Reads the disks of species s. Radii and masses in the input take precedence over those in the
+  !> file.
   subroutine read_disks(species, s, box)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: s
@@ -66,15 +67,16 @@ contains
       associate (n => size(me%in_file%rows, kind=int64))
         of_species = ""
         if (is_run(me%file)) of_species = " of species """//me%name//'"'
-        if (me%count > 0 .and. n /= me%count) call refuse(me, me%file//": "//counted(n, "disk")//of_species &
-          //", but species.count is "//written(me%count))
+        if (me%count > 0 .and. n /= me%count - me%waiting) call refuse(me, me%file//": "//counted(n, "disk")//of_species &
+          //", but species.count is "//me%count_text())
         if (n > 0) call join(me)
         if (n > 0) call check_numbers(me, maxval(abs([box%lower, box%upper])))
       end associate
     end associate
   end subroutine read_disks
 
-  !> Records why the disks in a starting file cannot be used, unless an earlier reason has already been recorded.
+  !> Records why the disks in the file cannot be used, unless an earlier reason has already been
+  !> recorded.
   subroutine refuse(me, why)
     type(species_settings_t), intent(inout) :: me
     character(len=*), intent(in) :: why
@@ -82,9 +84,9 @@ contains
     if (.not. allocated(me%in_file%error)) call fail(me%in_file%error, exit_usage, why)
   end subroutine refuse
 
-  !> Completes the table of disks with values from the input. The procedure reports each quantity that is missing in both the file
-  !> and the input. The procedure also reports each quantity that both a text file and the input contain. If the output file of a
-  !> run and the input contain the same quantity, the value in the input is used, and no error is reported.
+  !> Completes the table of disks with values from the input, and reports each quantity that both
+  !> lack or that a text file and the input both contain. If the output file of a run and the input
+  !> contain the same quantity, the value in the input is used, and no error is reported.
   subroutine join(me)
     type(species_settings_t), intent(inout) :: me
     logical :: wanted(radius_row:mass_row)
@@ -119,7 +121,7 @@ contains
     end subroutine refuse_both
   end subroutine join
 
-  !> Reports each number in the file that is outside the range of numbers that the input may contain.
+  !> Reports each number in the file outside the range of numbers allowed in the input.
   subroutine check_numbers(me, farthest)
     type(species_settings_t), intent(inout) :: me
     real(real64), intent(in) :: farthest                      !! largest coordinate in the box [length]

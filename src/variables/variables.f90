@@ -4,7 +4,9 @@
 module variables
   use boundary_variables, only: boundary_rows
   use disk_variables, only: disk_rows
-  use run_variables, only: output_rows, run_rows, stop_rows
+  use drives, only: drive_rows
+  use run_variables, only: change_rows, output_rows, run_rows, stop_rows
+  use source_variables, only: source_rows
   use texts, only: joined, written
   use variable_rows, only: in_motion, largest, most_disks, most_threads, name_length, never, obstacle_groups, on_resume, &
     smallest, variable_t, wall_groups
@@ -14,10 +16,11 @@ module variables
   public :: change_of, excluded_by, first_sentence, full_names, in_motion, on_resume
   public :: track_of, words_of, excludes, allowed, either, smallest, largest, most_disks, most_threads, name_length
 
-  character(len=8), parameter :: group_names(10) = [character(len=8) :: &
-    "run", "box", "side", "obstacle", "wall", "species", "contact", "drive", "stop", "output"]
+  character(len=8), parameter :: group_names(12) = [character(len=8) :: &
+    "run", "box", "side", "obstacle", "wall", "species", "contact", "drive", "source", "change", "stop", "output"]
 
-  type(variable_t), parameter :: table(*) = [run_rows, boundary_rows, disk_rows, stop_rows, output_rows]
+  type(variable_t), parameter :: table(*) = [run_rows, boundary_rows, disk_rows, drive_rows, source_rows, change_rows, stop_rows, &
+    output_rows]
 
 contains
 
@@ -40,7 +43,7 @@ contains
     character(len=*), intent(in) :: group
     logical :: is_repeated
 
-    is_repeated = any(wall_groups == group) .or. group == "species"
+    is_repeated = any(wall_groups == group) .or. group == "species" .or. group == "source" .or. group == "change"
   end function is_repeated
 
   !> Names of the variables of a group, in the order of the table.

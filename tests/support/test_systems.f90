@@ -13,7 +13,7 @@ module test_systems
   use neighbour_search, only: earliest_contact, prediction_t, no_gravity
   use partners, only: n_sides
   use random_stream, only: random_stream_t
-  use run_setup, only: input_from_text
+  use run_input, only: input_from_text
   use settings, only: run_input_t
   use shapes, only: shape_t
   use simulation_state, only: simulation_t

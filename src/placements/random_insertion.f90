@@ -1,11 +1,14 @@
-!> Random sequential insertion: each disk is inserted at a point that is uniformly distributed among all points where the disk fits
-!> between the previous disks. The region is divided into voxels (small rectangles). A voxel is eliminated if a single disk excludes
-!> the centre of a new disk from the whole voxel, and points are drawn only from the remaining voxels. All voxels are halved along
-!> both axes when attempts fail too often. Because attempts in eliminated voxels would always fail, the method generates the same
-!> distribution as simple insertion, but the method can reach saturation (Zhang and Torquato, 2013, doi:10.1103/PhysRevE.88.053312).
-!> If the disks have different radii, the largest disks are inserted first, and no voxels are eliminated, because a voxel without
-!> space for one disk may have space for a smaller disk. The insertion of disks with different radii ends when many attempts to
-!> insert a disk have failed.
+!> Random sequential insertion: each disk is inserted at a point uniformly distributed over all
+!> points where it fits between the previous disks. The region is divided into small rectangles
+!> called voxels. A voxel is eliminated if a single disk excludes the centre of a new disk from all
+!> of it. Points are drawn only from the remaining voxels, which are halved along both axes when
+!> attempts fail too often. Since attempts in eliminated voxels would always fail, the distribution
+!> is that of simple insertion, but saturation can be reached (Zhang and Torquato, 2013,
+!> doi:10.1103/PhysRevE.88.053312).
+!>
+!> Disks of different radii are inserted in order of decreasing radius. No voxels are then
+!> eliminated, because a voxel without space for one disk may have space for a smaller one, and the
+!> insertion ends after many failed attempts.
 module random_insertion
   use kinds, only: int32, real64
   use memory_hints, only: prefetch
@@ -29,7 +32,7 @@ module random_insertion
     integer(int32), allocatable :: column_row(:, :) !! (2,n) column and row of each voxel, starting at 0
   end type voxels_t
 
-  !> The random numbers of an attempt, and the state of the random stream after these numbers have been drawn.
+  !> Random numbers of an attempt, and the state of the random stream after them.
   type :: attempt_t
     real(real64) :: voxel = 0.0_real64              !! random number in [0, 1) that selects the voxel
     real(real64) :: place(2) = 0.0_real64           !! position in the voxel, as fractions of its edges
@@ -38,8 +41,8 @@ module random_insertion
 
 contains
 
-  !> Inserts the disks of a species until all disks are placed or no space is left. `first` is the index of the first disk of the
-  !> species.
+  !> Inserts the disks of a species, beginning with disk `first`, until all are placed or no space
+  !> is left.
   subroutine insert_at_random(packing, s, first, size_of, stream, line, placed)
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: s                 !! index of a species for which `open_species` was called
@@ -104,8 +107,8 @@ contains
         voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last voxel replaces the eliminated voxel
         voxels%n = voxels%n - 1
       end if
-      ! Dividing the voxels saves time only after the number of failed attempts has exceeded about twice the number of voxels,
-      ! because the division of a voxel requires four searches.
+      ! Dividing the voxels pays off only after about twice as many failed attempts as there are
+      ! voxels, because the division of a voxel requires four searches.
       if (failures > 2*voxels%n) then
         call halve(voxels, packing, radius)
         call line%show_share("placing disks", real(placed, real64)/count)
@@ -124,9 +127,9 @@ contains
       p = min(max(voxels%origin + (voxels%column_row(:, chosen(voxels, attempt)) + attempt%place)*voxels%side, lower), upper)
     end function place
 
-    !> Prefetches data for future attempts: the voxel of the attempt that was drawn last, and the cells and disks near the points of
-    !> two attempts that were drawn earlier. Consecutive attempts read different parts of the memory, and prefetching saves time if
-    !> the data of the disks do not fit into the cache.
+    !> Prefetches data for future attempts: the voxel of the attempt drawn last, and the cells and
+    !> disks near the points of two earlier ones. Consecutive attempts access distant parts of the
+    !> memory, so this saves time if the data exceed the cache.
     subroutine load_ahead()
       associate (far => coming(modulo(attempts - 1, drawn_ahead)), near => coming(modulo(attempts + 3, drawn_ahead)), &
           next => coming(modulo(attempts + 1, drawn_ahead)))
@@ -148,8 +151,8 @@ contains
     attempt%after = stream
   end subroutine draw_attempt
 
-  !> Index of the voxel that an attempt selects. The index is calculated from the random number of the attempt by the same formula
-  !> as in `draw_index`.
+  !> Index of the voxel that an attempt selects, calculated from its random number by the formula of
+  !> `draw_index`.
   pure function chosen(voxels, attempt) result(k)
     type(voxels_t), intent(in) :: voxels
     type(attempt_t), intent(in) :: attempt
@@ -158,17 +161,16 @@ contains
     k = 1 + int(voxels%n*attempt%voxel, int32)
   end function chosen
 
-  !> Sorts disks by decreasing radius, with a resolution of a thousandth of the range of radii. Disks whose radii are in the same
-  !> thousandth of the range keep their relative order.
+  !> Order of decreasing radius with a resolution of a thousandth of the range of radii, within
+  !> which disks keep their original order.
   pure function largest_first(radius) result(order)
     real(real64), intent(in) :: radius(:)           !! [length]
     integer(int32), parameter :: classes = 1000
-    integer(int32) :: order(size(radius)), place(size(radius)), k
+    integer(int32) :: order(size(radius))
     integer(int32), allocatable :: first(:)
 
     call sort_by_count(1 + int(classes*(maxval(radius) - radius)/max(maxval(radius) - minval(radius), tiny(radius)), int32), &
-      classes + 1, first, place)
-    order(place) = [(k, k=1, size(radius, kind=int32))]
+      classes + 1, first, order)
   end function largest_first
 
   !> The centre of voxel k.
@@ -180,7 +182,8 @@ contains
     p = voxels%origin + (voxels%column_row(:, k) + 0.5_real64)*voxels%side
   end function middle
 
-  !> Divides each voxel into four voxels, and removes those new voxels that a single disk or obstacle excludes completely.
+  !> Divides each voxel into four, and removes those new voxels that a single disk or obstacle
+  !> excludes completely.
   pure subroutine halve(voxels, packing, radius)
     type(voxels_t), intent(inout) :: voxels
     type(packing_t), intent(in) :: packing

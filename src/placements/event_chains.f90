@@ -1,24 +1,28 @@
-!> Equilibration of a dense packing by event-chain Monte Carlo (Bernard, Krauth and Wilson, 2009, doi:10.1103/PhysRevE.80.056704).
-!> In an event chain, one disk moves along an axis until it touches a second disk. The second disk then moves in the same direction
-!> until it touches a third disk, and so on, until the sum of all displacements equals the length of the chain. Chains along x and
-!> along y alternate.
+!> Equilibration of a dense packing by event-chain Monte Carlo (Bernard, Krauth and Wilson, 2009,
+!> doi:10.1103/PhysRevE.80.056704). In an event chain, a disk moves along an axis until it touches a
+!> second disk, which then moves in the same direction until it touches a third, and so on, until
+!> the sum of all displacements equals the length of the chain. Chains along x and along y
+!> alternate.
 !>
-!> Along a periodic axis all chains move to the right or upwards. The state of a chain consists of the positions of all disks and
-!> the index of the moving disk. Each state of a chain has exactly one predecessor, and the motion preserves the volume of a set of
-!> states. The uniform distribution of all packings is therefore stationary (global balance), although no chain moves backwards. The
-!> uniform distribution is stationary only if the first disk of each chain is drawn uniformly from all disks, and if the length of
-!> the chain does not depend on the positions.
+!> Along a periodic axis all chains move to the right or upwards. The state of a chain consists of
+!> the positions of all disks and the index of the moving disk. Each state has exactly one
+!> predecessor, and the motion preserves the volume of a set of states. The uniform distribution of
+!> all packings is therefore stationary (global balance), although no chain moves backwards. This
+!> requires that the first disk of each chain is drawn uniformly from all disks, and that the length
+!> of the chain does not depend on the positions.
 !>
-!> If an axis is not periodic, a disk that reaches a side reverses its direction and continues (straight event chains in a box with
-!> walls, Li et al., 2022, doi:10.1063/5.0126437). The state of such a chain includes its direction. Each state has exactly one
-!> predecessor even with reflections, because a disk that touches a side and moves away from the side has just been reflected. The
-!> first direction of a chain between two sides is drawn at random, because the uniform distribution is stationary only if both
-!> directions are equally probable. If a chain between two sides is reversed at its end, the chain leads back to its start. Chains
-!> between sides therefore also satisfy detailed balance.
+!> Along an axis with sides, a disk that reaches a side reverses its direction and continues
+!> (straight event chains in a box with walls, Li et al., 2022, doi:10.1063/5.0126437). The state
+!> then includes the direction. Each state still has exactly one predecessor, because a disk that
+!> touches a side and moves away from it has just been reflected. The initial direction is random,
+!> because the uniform distribution is stationary only if both directions are equally probable. A
+!> chain between two sides that is reversed at its end leads back to its start, so such chains also
+!> satisfy detailed balance.
 !>
-!> If the radii differ, a swap is attempted after each chain: two disks, drawn uniformly from all disks, exchange their positions
-!> unless the larger disk would overlap another disk or a side (Grigera and Parisi, 2001, doi:10.1103/PhysRevE.63.045102). Swaps
-!> satisfy detailed balance, because the two disks are drawn independently of the positions.
+!> If the radii differ, a swap is attempted after each chain: two disks, drawn uniformly from all
+!> disks, exchange their positions unless the larger one would overlap another disk or a side
+!> (Grigera and Parisi, 2001, doi:10.1103/PhysRevE.63.045102). Swaps satisfy detailed balance,
+!> because the two disks are drawn independently of the positions.
 module event_chains
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
@@ -31,16 +35,16 @@ module event_chains
   public :: relax, shuffle
 
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! packing fraction of the triangular lattice
-  integer, parameter :: stream_number = 8         !! number that identifies the random streams of this module
+  integer, parameter :: stream_number = 8         !! number of the random streams used by this module
   integer, parameter :: chains_per_look = 1024    !! number of chains between two updates of the status line
-  !> Smallest fraction of the length of a chain that `usual_steps` successive moves must cover; if they cover less, the chain is
-  !> jammed and ends.
+  !> Smallest fraction of the length of a chain that `usual_steps` successive moves must cover; a
+  !> chain that falls behind is jammed and ends.
   real(real64), parameter :: jammed = 1.0e-3_real64
 
 contains
 
-  !> Equilibrates the disks of a packing without overlaps. The random numbers of a sweep depend only on the seed of the run and on
-  !> the number of the sweep.
+  !> Equilibrates the disks of a packing without overlaps. The random numbers of a sweep depend only
+  !> on the seed of the run and on the number of the sweep.
   subroutine relax(box, radius, seed, sweeps, line, x)
     type(box_t), intent(in) :: box                !! box without obstacles; its gravity and shear are ignored
     real(real64), intent(in) :: radius(:)         !! (n) [length]
@@ -90,7 +94,8 @@ contains
     call line%tell(report(sweeps, swapped))
   end subroutine relax
 
-  !> Text about a relaxation. The share of accepted swaps shows whether disks of different radii have been mixed.
+  !> Report on a relaxation. The share of accepted swaps shows how well disks of different radii
+  !> have been mixed.
   pure function report(sweeps, swapped) result(text)
     integer(int64), intent(in) :: sweeps, swapped(2)
     character(len=:), allocatable :: text
@@ -99,7 +104,8 @@ contains
     if (swapped(1) > 0) text = text//", "//written(swapped(2))//" of "//written(swapped(1))//" swaps of different radii accepted"
   end function report
 
-  !> Fills a packing with disks. The disks are divided into layers, and the radii in one layer differ by less than a factor of two.
+  !> Fills a packing with disks, divided into layers within which the radii differ by less than a
+  !> factor of two.
   subroutine fill(packing, box, radius, x)
     type(packing_t), intent(out) :: packing
     type(box_t), intent(in) :: box
@@ -122,11 +128,11 @@ contains
     end do
   end subroutine fill
 
-  !> Estimate of the mean displacement of a disk in a chain. In equilibrium the pressure determines the ratio of two mean lengths:
-  !> the distance between the centres of two successive disks of a chain along its direction, and the displacement of a disk
-  !> (Michel, Kapfer and Krauth, 2014, doi:10.1063/1.4863991). The ratio of the mean distance to the mean displacement is Z - 1,
-  !> where Z is the compressibility factor, and the mean distance is pi/4 diameters. For Z - 1 the function uses the larger of two
-  !> estimates, from scaled particle theory and from the free volume of a crystal.
+  !> Estimate of the mean displacement of a disk in a chain. In equilibrium the mean distance
+  !> between two successive disks of a chain along its direction, which is pi/4 diameters, divided
+  !> by the mean displacement of a disk is Z - 1, where Z is the compressibility factor (Michel,
+  !> Kapfer and Krauth, 2014, doi:10.1063/1.4863991). For Z - 1 the larger of two estimates is used,
+  !> from scaled particle theory and from the free volume of a crystal.
   pure function mean_step(box, radius) result(step)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: radius(:)
@@ -145,8 +151,8 @@ contains
     integer, intent(in) :: axis                   !! 1 for x, 2 for y
     integer, intent(in) :: first_sense            !! 1 to start to the right or upwards, -1 to start in the opposite direction
     real(real64), intent(in) :: length            !! sum of all displacements [length]
-    !> Number of moves between two tests for a jam. The test is needed because no disk can move at closest packing, where a chain
-    !> would never end.
+    !> Number of moves between two tests for a jam, without which a chain would never end at closest
+    !> packing, where no disk can move.
     integer, intent(in) :: usual_steps
     real(real64) :: left, left_before, distance   ! [length]
     integer(int32) :: k, partner
@@ -171,8 +177,8 @@ contains
       else
         sense = -sense
         bounces = bounces + 1
-        ! A disk that moves between two sides without touching another disk repeats its motion; whole periods of the motion are
-        ! skipped.
+        ! A disk moving between two sides without touching another disk repeats its motion; whole
+        ! periods are skipped.
         if (bounces == 2) left = modulo(left, max(2*room(packing, k, axis, sense), tiny(left)))
       end if
       step = step + 1
@@ -182,7 +188,7 @@ contains
     end do
   end subroutine move_chain
 
-  !> Distance that disk k can move along a walled axis before the disk touches a side.
+  !> Distance that disk k can move along a walled axis before it touches a side.
   pure function room(packing, k, axis, sense) result(distance)
     type(packing_t), intent(in) :: packing
     integer(int32), intent(in) :: k
@@ -199,8 +205,8 @@ contains
     end associate
   end function room
 
-  !> Exchanges the positions of two disks of different radii, unless the larger disk would overlap another disk or a side. The
-  !> smaller disk always fits at the position of the larger disk.
+  !> Exchanges the positions of two disks of different radii, unless the larger one would overlap
+  !> another disk or a side. The smaller one always fits at the position of the larger one.
   pure subroutine try_swap(packing, i, j, swapped)
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: i, j

@@ -1,4 +1,5 @@
-!> Definitions for the table of all input variables: the type of the rows, and the ranges and limits of numbers.
+!> Definitions for the table of all input variables: the types of the rows and of the choices, and
+!> the ranges and limits of numbers.
 module variable_rows
   use kinds, only: real64
   implicit none
@@ -9,9 +10,9 @@ module variable_rows
   real(real64), parameter, public :: smallest = 1.0e-100_real64    !! smallest absolute value of a nonzero number in the input
   real(real64), parameter, public :: largest = 1.0e100_real64  !! largest absolute value of a number in the input
 
-  !> Occasions on which the value of a variable may change after the start of a run: never, on `--resume`, or in a running
-  !> simulation. Variables that do not affect the trajectory may change on `--resume`. Variables that affect the motion of the
-  !> disks, but not their number, properties or initial state, may change in a running simulation.
+  !> When a variable may change after the start of a run: never, on `--resume` (if it does not
+  !> affect the trajectory), or in a running simulation (if it affects the motion of the disks, but
+  !> not their number, properties or initial state).
   character(len=9), parameter, public :: never = "never", on_resume = "on resume", in_motion = "running"
 
   type, public :: range_t
@@ -21,7 +22,7 @@ module variable_rows
 
   !> Groups that describe obstacles.
   character(len=8), parameter, public :: obstacle_groups(2) = [character(len=8) :: "obstacle", "wall"]
-  !> Groups that describe boundaries: sides of the box and obstacles. In the reference file, the groups that describe boundaries are
+  !> Groups that describe boundaries: sides of the box and obstacles. In the reference file they are
   !> commented out.
   character(len=8), parameter, public :: wall_groups(*) = [character(len=8) :: "side", obstacle_groups]
 
@@ -47,28 +48,39 @@ module variable_rows
     character(len=name_length) :: name
     character(len=8) :: kind                 !! type of the values, 'integer', 'real', 'logical' or 'text'
     integer :: size                          !! required number of values; 0 if any number of values is allowed
-    character(len=8) :: status               !! a status that is explained at the end of this file
+    character(len=8) :: status               !! a status, as explained at the end of this file
     character(len=24) :: value  !! default or example, as written in an input file
     character(len=help_length) :: help       !! help text in full sentences; the first sentence names the quantity
     type(range_t) :: range = anything        !! range of numbers
     character(len=16) :: unit = ""
-    !> Allowed texts, separated by blanks; empty if any text is allowed. The module `choices` contains the meanings of the allowed
-    !> texts.
-    character(len=100) :: choices = ""
-    !> Condition under which the variable has an effect: the name of a second variable, followed by one or more values of the second
-    !> variable. Example: "motion sine parabolic" means that the variable applies only if motion is 'sine' or 'parabolic'.
+    !> Keywords, separated by blanks, that are allowed; empty if any string is allowed. The module
+    !> `choices` contains their meanings.
+    character(len=240) :: choices = ""
+    !> Condition under which the variable has an effect: the name of a second variable, followed by
+    !> one or more of its values. Example: "motion sine parabolic" means that the variable applies
+    !> only if motion is 'sine' or 'parabolic'.
     character(len=60) :: goes_with = ""
-    !> Names of the variables in the same group that must not be given together with this variable, separated by blanks.
+    !> Names of variables in the same group, separated by blanks, that cannot be combined with this
+    !> one.
     character(len=80) :: excludes = ""
     character(len=9) :: may_change = never   !! when the value may change after the start of a run
     character(len=100) :: otherwise = ""     !! description of the default if the default is not a constant
   end type variable_t
 
-  ! The status of a variable determines its line in the reference file and the content of the component `value`.
-  ! A variable with the status "default" has a default value, which its line contains.
-  ! A variable with the status "fallback" has a default value where the variable applies, and its line is a comment.
-  ! A variable with the status "example" has no default value; its line contains an example, because a value must be given.
-  ! A variable with the status "required" must be given with the choice with which it applies; its line is an example as a comment.
-  ! A variable with the status "optional" has no default value and need not be given; its line is an example as a comment.
+  !> An allowed keyword of a variable. Variables with the same name in several groups have the same
+  !> keywords.
+  type, public :: choice_t
+    character(len=19) :: name                !! name of the variable
+    character(len=17) :: word                !! the keyword
+    character(len=300) :: meaning            !! description in one or more full sentences or phrases
+  end type choice_t
+
+  ! The status of a variable determines its line in the reference file and the meaning of the
+  ! component `value`:
+  ! - "default": the default value, which the line contains.
+  ! - "fallback": the default value where the variable applies; the line is a comment.
+  ! - "example": an example, because a value must be given.
+  ! - "required": an example, as a comment; must be given with the choice with which it applies.
+  ! - "optional": an example, as a comment; there is no default, and the variable need not be given.
 
 end module variable_rows

@@ -1,0 +1,69 @@
+!> The numbers of samples, on their way to the output file.
+module sample_numbers
+  use kinds, only: int64, real64
+  implicit none
+  private
+  public :: first_values, sample_t
+
+  !> The values of one or more samples of the same quantities. The reals and the integers of a sample
+  !> are in two arrays, each in the order of the quantities.
+  type :: sample_t
+    real(real64), allocatable :: reals(:, :)         !! (reals in a sample, samples)
+    integer(int64), allocatable :: integers(:, :)    !! (integers in a sample, samples)
+  contains
+    procedure :: count => count_samples
+    procedure :: make_room
+    procedure :: first
+    procedure :: insert
+  end type sample_t
+
+contains
+
+  !> Index of the first value of each of several quantities among the reals or the integers of a sample.
+  pure function first_values(width, is_integer) result(first)
+    integer, intent(in) :: width(:)                  !! number of values of each quantity
+    logical, intent(in) :: is_integer(:)             !! whether the values of each quantity are integers
+    integer :: first(size(width)), k
+
+    first = [(1 + sum(width(:k - 1), is_integer(:k - 1) .eqv. is_integer(k)), k=1, size(width))]
+  end function first_values
+
+  !> Number of samples.
+  pure function count_samples(self) result(n)
+    class(sample_t), intent(in) :: self
+    integer(int64) :: n
+
+    n = size(self%reals, 2, int64)
+  end function count_samples
+
+  !> Allocates `n` samples of the shape of another sample.
+  subroutine make_room(self, like, n)
+    class(sample_t), intent(out) :: self
+    type(sample_t), intent(in) :: like
+    integer(int64), intent(in) :: n
+
+    allocate (self%reals(size(like%reals, 1), n), self%integers(size(like%integers, 1), n))
+  end subroutine make_room
+
+  !> The first `n` samples.
+  function first(self, n) result(part)
+    class(sample_t), intent(in) :: self
+    integer(int64), intent(in) :: n
+    type(sample_t) :: part
+
+    call part%make_room(self, n)                     ! gfortran 12 warns of uninitialised bounds otherwise
+    part%reals = self%reals(:, :n)
+    part%integers = self%integers(:, :n)
+  end function first
+
+  !> Replaces the samples after the first `n` by those of `new`.
+  subroutine insert(self, n, new)
+    class(sample_t), intent(inout) :: self
+    integer(int64), intent(in) :: n
+    type(sample_t), intent(in) :: new
+
+    self%reals(:, n + 1:n + new%count()) = new%reals
+    self%integers(:, n + 1:n + new%count()) = new%integers
+  end subroutine insert
+
+end module sample_numbers

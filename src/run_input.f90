@@ -1,0 +1,384 @@
+!> Reads and checks the input of a run, and plans the changes of the system during the run (`&change`). A change, whether planned or
+!> made in a simulation in memory, is described by the input with some values replaced.
+module run_input
+  use box_geometry, only: box_t
+  use box_sides, only: bounds
+  use changes, only: continue_sides, missing_data
+  use errors, only: error_t
+  use input_fit, only: check_fit, complete_settings
+  use input_groups, only: group_t, range_of, same_value, same_values
+  use input_problems, only: problem_list_t
+  use input_settings, only: resolve_settings
+  use input_text, only: read_text
+  use kinds, only: int64, real64
+  use namelist_input, only: read_groups
+  use partners, only: n_sides, side_name
+  use settings, only: run_input_t
+  use simulation_state, only: change_t
+  use system, only: print_text
+  use texts, only: digits, letters, lower_case, place_of, shown, text_t, written
+  use variable_help, only: groups_text, input_of
+  use variables, only: change_of, in_motion, row_of, table, words_of
+  implicit none
+  private
+  public :: changed_input, changes_nothing, fixed_variable, fold_changes, input_from_text, plan_changes, read_input
+
+contains
+
+  !> Reads the input file `path`, applies the overrides and checks the input. With `printed`, all readable parts of the input are
+  !> printed, even if the input is invalid.
+  subroutine read_input(path, overrides, input, error, printed)
+    character(len=*), intent(in) :: path
+    type(text_t), intent(in) :: overrides(:)                        !! overrides in the form GROUP.VARIABLE=VALUE
+    type(run_input_t), intent(out) :: input
+    type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: printed
+    character(len=:), allocatable :: text
+
+    call read_text(path, text, error)
+    if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error, printed)
+  end subroutine read_input
+
+  !> Version of `read_input` for a text instead of a file; `path` only appears in messages. All problems are collected in one error.
+  subroutine input_from_text(text, path, overrides, input, error, printed, stepped)
+    character(len=*), intent(in) :: text
+    character(len=*), intent(in) :: path
+    type(text_t), intent(in) :: overrides(:)
+    type(run_input_t), intent(out) :: input
+    type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: printed
+    logical, intent(in), optional :: stepped                        !! see `resolve_settings`
+    type(problem_list_t) :: problems
+    logical :: complete
+
+    input%path = path
+    input%text = text
+    input%overrides = overrides
+    call read_groups(text, overrides, input%groups, problems, complete)
+    if (present(printed)) call print_text(groups_text(input%groups), error)
+    if (allocated(error)) return
+    call resolve_input(input, complete, problems, .false., stepped)
+    if (problems%count == 0) call plan_changes(input, problems, stepped)
+    call problems%report(path, error, overrides)
+  end subroutine input_from_text
+
+  !> Converts the groups of an input to settings.
+  subroutine resolve_input(input, complete, problems, running, stepped)
+    type(run_input_t), intent(inout) :: input
+    logical, intent(inout) :: complete                              !! .false. if parts of the text could not be read
+    type(problem_list_t), intent(inout) :: problems                 !! problems found so far; further problems are added
+    logical, intent(in) :: running                                  !! see `check_fit`
+    logical, intent(in), optional :: stepped                        !! see `resolve_settings`
+
+    if (.not. complete) return  ! variables in unreadable parts of the text must not be reported as missing
+    call resolve_settings(input%groups, input%settings, problems, stepped)
+    call complete_settings(input%settings, input%groups, problems, complete)
+    if (complete) call check_fit(input%settings, input%groups, problems, running)
+  end subroutine resolve_input
+
+  !> Determines the system after each of the changes in the input, and reports changes that are not
+  !> possible.
+  subroutine plan_changes(input, problems, stepped)
+    type(run_input_t), intent(inout) :: input
+    type(problem_list_t), intent(inout) :: problems
+    logical, intent(in), optional :: stepped                        !! see `resolve_settings`
+    type(run_input_t) :: present_input
+    integer, allocatable :: order(:)                                ! positions of the groups, in the order of the times
+    integer :: k
+
+    if (allocated(input%settings%schedule)) deallocate (input%settings%schedule)
+    call order_changes(input%groups, order, problems)
+    if (size(order) == 0 .or. problems%count > 0) return
+    present_input = input
+    allocate (input%settings%schedule(size(order)))
+    do k = 1, size(order)
+      call plan_change(present_input, input%groups(order(k)), input%settings%schedule(k), problems, stepped)
+    end do
+    if (problems%count > 0) return
+    do k = 1, size(order)
+      call input%settings%features%unite(input%settings%schedule(k)%system%features)
+    end do
+    do k = 1, size(order)
+      input%settings%schedule(k)%system%features = input%settings%features
+    end do
+  end subroutine plan_changes
+
+  !> Orders the changes by time, and at equal times as in the file. Incomplete changes, and names
+  !> that are invalid or used twice, are reported.
+  subroutine order_changes(groups, order, problems)
+    type(group_t), intent(in) :: groups(:)
+    integer, allocatable, intent(out) :: order(:)
+    type(problem_list_t), intent(inout) :: problems
+    integer, parameter :: longest_name = 40
+    character(len=:), allocatable :: name
+    real(real64) :: time
+    integer :: range(2), j, k
+
+    range = range_of(groups, ["change"])
+    allocate (order(0))
+    do k = range(1), range(2)
+      name = trim(groups(k)%instance)
+      associate (group => groups(k))
+        call group%demand("time", problems)
+        call group%demand("set", problems)
+        if (verify(name, letters//digits//"_-") > 0 .or. len(name) > longest_name) call group%complain("name", shown(name) &
+          //" is not a name; allowed: up to "//written(longest_name)//" letters, digits, _ and -", problems)
+        if (any(groups(range(1):k - 1)%instance == name)) call group%complain("name", "a second change is called "//shown(name), &
+          problems)
+        time = group%real_of("time", 0.0_real64)
+      end associate
+      do j = size(order), 1, -1
+        if (groups(order(j))%real_of("time", 0.0_real64) <= time) exit
+      end do
+      order = [order(:j), k, order(j + 1:)]
+    end do
+  end subroutine order_changes
+
+  !> Determines the system after a change.
+  subroutine plan_change(before, group, change, problems, stepped)
+    type(run_input_t), intent(inout) :: before                      !! in: input before the change; out: input after the change
+    type(group_t), intent(in) :: group                              !! group of the change
+    type(change_t), intent(out) :: change
+    type(problem_list_t), intent(inout) :: problems
+    logical, intent(in), optional :: stepped                        !! see `resolve_settings`
+    type(run_input_t) :: after
+    type(problem_list_t) :: own
+    type(box_t) :: box
+    character(len=:), allocatable :: problem
+    integer :: k, line
+
+    associate (slot => group%values(row_of("change", "set")))
+      line = merge(group%line, slot%line, slot%line <= 0)
+      change%lines = [(text_t(trim(adjustl(slot%texts(k)))), k=1, size(slot%texts))]
+    end associate
+    change%name = trim(group%instance)
+    change%time = group%real_of("time", 0.0_real64)
+    change%origin = before%path//":"//written(line)//": change."//change%name
+    do k = 1, size(change%lines)
+      if (fixed_variable(change%lines(k)%text) /= "") &
+        call own%add(0, fixed_variable(change%lines(k)%text), "cannot change in a running simulation")
+    end do
+    box = foreseen_box(before)
+    if (own%count == 0) call changed_input(before, change%lines, box, change%time, after, own, stepped)
+    if (own%count == 0) then
+      problem = missing_data(before%settings%system_t, after%settings%system_t)
+      if (problem /= "") call own%add(0, "set", problem)
+    end if
+    do k = 1, own%count
+      call problems%add(group%values(row_of("change", "set"))%line, "change."//change%name, own%items(k)%text)
+    end do
+    if (own%count > 0) return
+    change%is_empty = changes_nothing(before, after, stepped)
+    call continue_sides(box, after%settings%box, change%time)
+    change%system = after%settings%system_t
+    deallocate (change%system%box%obstacle)
+    before = after
+  end subroutine plan_change
+
+  !> The box of an input. The position of a piston is not known beforehand; it is taken to be at the edge of the box.
+  function foreseen_box(input) result(box)
+    type(run_input_t), intent(in) :: input
+    type(box_t) :: box
+    integer :: k
+
+    box = input%settings%box
+    do k = 1, n_sides
+      if (box%side(k)%is_piston()) deallocate (box%side(k)%motion)
+    end do
+  end function foreseen_box
+
+  !> Changes values of an input. A side with a new motion starts it from its present position.
+  subroutine changed_input(before, lines, box, t, after, problems, stepped)
+    type(run_input_t), intent(in) :: before
+    type(text_t), intent(in) :: lines(:)                            !! changes in the form GROUP.VARIABLE=VALUE
+    type(box_t), intent(in) :: box                                  !! box before the change, with the positions of the sides
+    real(real64), intent(in) :: t                                   !! time relative to the time origin `box%epoch` [time]
+    type(run_input_t), intent(out) :: after
+    type(problem_list_t), intent(inout) :: problems
+    logical, intent(in), optional :: stepped                        !! see `resolve_settings`
+    logical :: complete
+
+    after%path = before%path
+    after%overrides = lines
+    call read_groups(input_of(before%groups), lines, after%groups, problems, complete)
+    call drop_former_motion(before%groups, after%groups)
+    call keep_sides(before%groups, after%groups, box, t)
+    call resolve_input(after, complete, problems, .true., stepped)
+  end subroutine changed_input
+
+  !> Replaces an input by one for the system after the first scheduled changes, without these changes.
+  subroutine fold_changes(input, made, box, error)
+    type(run_input_t), intent(inout) :: input
+    integer(int64), intent(in) :: made                              !! number of changes
+    type(box_t), intent(in) :: box                                  !! present box
+    type(error_t), allocatable, intent(out) :: error
+    type(run_input_t) :: before, after
+    type(problem_list_t) :: problems
+    type(group_t), allocatable :: left(:)
+    integer :: g, k, v, n
+
+    after = input
+    do k = 1, int(made)
+      before = after
+      associate (change => input%settings%schedule(k))
+        call changed_input(before, change%lines, foreseen_box(before), change%time, after, problems, stepped=.true.)
+        call continue_sides(foreseen_box(before), after%settings%box, change%time)
+      end associate
+    end do
+    call move_sides(after%groups, box)
+    allocate (left(size(after%groups)))
+    v = row_of("change", "name")
+    n = 0
+    do g = 1, size(after%groups)
+      associate (group => after%groups(g), schedule => input%settings%schedule)
+        if (group%name == "change" .and. any([(schedule(k)%name == group%instance, k=1, int(made))])) cycle
+        if (group%name == "change") group%values(v)%given = .true.  ! the number of a change may differ from its name
+        n = n + 1
+        left(n) = group
+      end associate
+    end do
+    after%groups = left(:n)
+    after%text = input_of(after%groups)
+    deallocate (after%overrides)
+    allocate (after%overrides(0))
+    after%settings%run%threads = input%settings%run%threads
+    if (problems%count == 0) call plan_changes(after, problems, stepped=.true.)
+    call problems%report(input%path, error)
+    if (.not. allocated(error)) input = after
+  end subroutine fold_changes
+
+  !> Sets the variable `position` of each side to its value in the box, which depends on the course of the simulation.
+  subroutine move_sides(groups, box)
+    type(group_t), intent(inout) :: groups(:)
+    type(box_t), intent(in) :: box
+    real(real64) :: offsets(n_sides)
+    integer :: g, side, axis
+
+    offsets = box%side%offset()
+    do g = 1, size(groups)
+      side = place_of(trim(groups(g)%instance), side_name)
+      if (groups(g)%name /= "side" .or. side == 0) cycle
+      if (.not. has_position(groups(g))) cycle
+      axis = (side + 1)/2
+      associate (position => groups(g)%values(row_of("side", "position")), offset => offsets(side))
+        position%given = abs(offset) > 0
+        call position%clear()
+        if (position%given) position%reals = [merge(box%lower(axis) + offset, box%upper(axis) - offset, modulo(side, 2) == 1)]
+      end associate
+    end do
+  end subroutine move_sides
+
+  !> Whether the motion of a side has the variable `position`.
+  pure function has_position(side) result(yes)
+    type(group_t), intent(in) :: side
+    logical :: yes
+
+    associate (position => side%values(row_of("side", "position")))
+      yes = any(words_of(table(position%row)%goes_with) == side%text_of("motion"))
+    end associate
+  end function has_position
+
+  !> Name of the variable of a change that may not change in a running simulation; empty if it may. Unknown variables are reported
+  !> by `read_groups` instead.
+  pure function fixed_variable(line) result(name)
+    character(len=*), intent(in) :: line              !! change in the form GROUP.VARIABLE=VALUE
+    character(len=:), allocatable :: name, plain
+
+    name = ""
+    plain = lower_case(trim(adjustl(line(:index(line, "=") - 1))))
+    plain = plain(:index(plain//"(", "(") - 1)        ! removes the index of an element: box.gravity(2) becomes box.gravity
+    if (row_of(plain(:index(plain, ".") - 1), plain(index(plain, ".", back=.true.) + 1:)) == 0) return
+    if (change_of(plain) /= in_motion) name = line(:index(line, "=") - 1)
+  end function fixed_variable
+
+  !> Whether a changed input has the same values as the present one. A side without a group in the present input has default values.
+  function changes_nothing(before, after, stepped) result(yes)
+    type(run_input_t), intent(in) :: before, after
+    logical, intent(in), optional :: stepped          !! see `resolve_settings`
+    logical :: yes, complete
+    type(run_input_t) :: present_input
+    type(problem_list_t) :: problems
+    integer :: g
+
+    present_input%path = after%path
+    allocate (present_input%overrides(0))
+    do g = 1, size(after%groups)
+      associate (group => after%groups(g), now => before%groups)
+        if (any(now%name == group%name .and. now%instance == group%instance)) cycle
+        ! An override without a value creates the group of a side, with the default values.
+        present_input%overrides = [present_input%overrides, text_t("side."//trim(group%instance)//".motion=")]
+      end associate
+    end do
+    call read_groups(input_of(before%groups), present_input%overrides, present_input%groups, problems, complete)
+    call resolve_input(present_input, complete, problems, .true., stepped)
+    yes = problems%count == 0
+    if (yes) yes = same_values(present_input%groups, after%groups)
+  end function changes_nothing
+
+  !> Drops the variables of a side that have no effect with its new motion, such as the force on a piston that is now held.
+  !> Variables set by the change itself are kept and reported.
+  subroutine drop_former_motion(before, groups)
+    type(group_t), intent(in) :: before(:)            !! groups of the present input
+    type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
+    integer :: g, v, old
+
+    do g = 1, size(groups)
+      old = findloc(before%name == "side" .and. before%instance == groups(g)%instance, .true., dim=1)
+      if (groups(g)%name /= "side" .or. old == 0) cycle
+      if (before(old)%text_of("motion") == groups(g)%text_of("motion")) cycle
+      do v = 1, size(groups(g)%values)
+        associate (slot => groups(g)%values(v), words => words_of(table(groups(g)%values(v)%row)%goes_with))
+          if (.not. any(words == "motion") .or. slot%line < 0) cycle    ! an override has a negative line number
+          slot%given = slot%given .and. any(words == groups(g)%text_of("motion"))
+        end associate
+      end do
+    end do
+  end subroutine drop_former_motion
+
+  !> Sets the positions of all sides with a new motion, so that each starts from its present position.
+  subroutine keep_sides(before, groups, box, t)
+    type(group_t), intent(in) :: before(:)            !! groups of the present input
+    type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
+    type(box_t), intent(in) :: box                    !! see `changed_input`
+    real(real64), intent(in) :: t                     !! see `changed_input`
+    character(len=10), parameter :: of_motion(4) = [character(len=10) :: "motion", "velocity", "start_time", "end_time"]
+    ! Positions of the sides (axis, lower or upper) and of one side [length], time when a motion starts and its duration so far
+    ! [time]
+    real(real64) :: at(2, 2), x, start, passed
+    integer :: g, k, old, side, inwards
+    logical :: same
+
+    call bounds(box, t, at(:, 1), at(:, 2))
+    do g = 1, size(groups)
+      side = place_of(trim(groups(g)%instance), side_name)
+      if (groups(g)%name /= "side" .or. side == 0) cycle
+      associate (group => groups(g), position => groups(g)%values(row_of("side", "position")))
+        old = findloc(before%name == "side" .and. before%instance == group%instance, .true., dim=1)
+        same = old > 0
+        do k = 1, size(of_motion)
+          if (.not. same) exit
+          associate (new => group%values(row_of("side", trim(of_motion(k)))), &
+            then => before(old)%values(row_of("side", trim(of_motion(k)))))
+            same = .not. (new%given .or. then%given) .or. same_value(new, then)
+          end associate
+        end do
+        if (same) cycle
+        inwards = 2*modulo(side, 2) - 1               ! sign of the inward normal along the axis
+        x = at((side + 1)/2, merge(1, 2, inwards > 0))
+        position%given = has_position(group)
+        call position%clear()
+        if (.not. position%given) cycle
+        if (group%text_of("motion") == "constant_velocity") then
+          start = group%real_of("start_time", 0.0_real64)
+          passed = min(max(box%epoch + t, start), group%real_of("end_time", start)) - start
+          x = x - inwards*group%real_of("velocity", 0.0_real64)*passed
+        end if
+        position%reals = [x]
+        if (inwards > 0) position%given = abs(x - box%lower((side + 1)/2)) > 0
+        if (inwards < 0) position%given = abs(x - box%upper((side + 1)/2)) > 0
+        if (.not. position%given) call position%clear()
+      end associate
+    end do
+  end subroutine keep_sides
+
+end module run_input
