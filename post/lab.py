@@ -3,12 +3,16 @@
     python post/lab.py                 the inputs of the folder input/
     python post/lab.py my.nml          and your own input file
 
-On the page of the laboratory, the user chooses an input file and moves sliders, and the simulation
-responds at once.  The page of the laboratory also shows plots of speeds, energies and pressure.
-Several runs can be shown side by side.  The user can download a run as an input file, as a Python
-script that repeats the run, or as an output file with which the simulation program can continue the
-run.  The script prints the address of the page.  The script serves the page until the user presses
-Ctrl-C, which also ends all simulations.
+page
+  inputs, sliders    the simulation responds at once
+  plots              speeds, energies and pressure, with theory
+  several runs       side by side
+  downloads          input file, Python script that repeats the run, output file to continue
+
+The script prints the address of the page, and serves it until Ctrl-C ends all simulations.
+
+see also
+  docs/tutorials/laboratory.md
 """
 
 import asyncio
@@ -19,8 +23,8 @@ import webbrowser
 from argparse import ArgumentTypeError, BooleanOptionalAction, RawTextHelpFormatter
 from pathlib import Path
 
-from player import INPUTS, chooser, lab_page, view
 from ricochet import RunError
+from ricochet.figures.web_page import INPUTS, chooser, lab_page, view
 from ricochet.pages.lab import Lab, form
 from ricochet.pages.live import application, page_of, serving
 from ricochet.running.engine import library
@@ -29,9 +33,9 @@ from ricochet.script import Parser, launch
 from aiohttp import web
 
 USUAL_PORT = 8642  # links of the lesson lead to this port
-#: Python code that a worker process executes.  The module `player` is in the folder of this file.
+#: Python code that a worker process executes, with the folder of this file in its path.
 WORKER = """import sys; sys.path[:0] = [{!r}]
-from player import scene
+from ricochet.figures.film_data import scene
 from ricochet.pages.worker import work
 work(scene)"""
 
@@ -59,12 +63,20 @@ async def open_lab(lab: Lab, ports: list[int], visit: bool) -> None:
     lab.prepare()
     try:
         async with serving(application(routes(lab), frames="'self'"), *ports) as (address, stop):
+            if ports[0] == USUAL_PORT and f":{USUAL_PORT}/" not in address:
+                print(in_use(address), flush=True)
             if visit:
                 threading.Thread(target=webbrowser.open, args=[address], daemon=True).start()
             await stop.wait()
             await lab.close()
     finally:
         await lab.close()
+
+
+def in_use(address: str) -> str:
+    """Return the message that another program has the usual port of the laboratory."""
+    usual = f"http://127.0.0.1:{USUAL_PORT}/"
+    return f"Port {USUAL_PORT} is in use: in links of the lesson, replace {usual} by {address}"
 
 
 def port(text: str) -> int:

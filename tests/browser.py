@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from whole_runs import PATIENCE, wait_for
+from whole_runs import PATIENCE, wait_for, with_parent
 
 PORT = r"started successfully on port (\d+)"
 FLAGS = [
@@ -54,6 +54,21 @@ class Browser:
 
     def run(self, script: str, *arguments) -> object:
         return self.call("POST", "/execute/sync", {"script": script, "args": list(arguments)})
+
+    def until(self, condition: str, *arguments) -> None:
+        """Wait in the page until a script returns a true value.
+
+        Repeated commands would use more processor time than the page itself.
+        """
+        self.run(
+            f"""const given = arguments;
+            function found() {{ {condition} }}
+            return new Promise((done, fail) => (function look() {{
+              try {{ if (found(...given)) done(true); else setTimeout(look, 20); }}
+              catch (problem) {{ fail(problem); }}
+            }})());""",
+            *arguments,
+        )
 
     def resize(self, width: int, height: int, phone: bool = False) -> None:
         """Set the size of the page itself, as on a device."""
@@ -119,8 +134,9 @@ class Browser:
         body = {"actions": [{"type": "wheel", "id": "wheel", "actions": [scroll] * steps}]}
         self.call("POST", "/actions", body)
 
-    def press(self, key: str) -> None:
-        actions = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
+    def press(self, *keys: str) -> None:
+        kinds = "keyDown", "keyUp"
+        actions = [{"type": kind, "value": key} for key in keys for kind in kinds]
         body = {"actions": [{"type": "key", "id": "keys", "actions": actions}]}
         self.call("POST", "/actions", body)
 
@@ -136,7 +152,7 @@ def browsing(folder: Path, size: tuple[int, int] = (1300, 860)):
         pytest.skip(f"no {' and no '.join(missing)} (Debian packages chromium, chromium-driver)")
     log = folder / "chromedriver.log"
     with log.open("w") as file:  # the driver chooses a free port and prints it
-        command = ["chromedriver", "--port=0", "--allowed-ips=127.0.0.1"]
+        command = with_parent("chromedriver", "--port=0", "--allowed-ips=127.0.0.1")
         driver = subprocess.Popen(command, stdout=file, stderr=file)
     try:
         wait_for(lambda: re.search(PORT, log.read_text()) or driver.poll() is not None)

@@ -8,12 +8,17 @@ const view = { unit: 1, x: 0, y: 0 };  // pixels per unit of length; position of
 
 const across = x => (x - view.x) * view.unit, up = y => page.height - (y - view.y) * view.unit;
 const backAcross = px => view.x + px / view.unit, backUp = py => view.y + (page.height - py) / view.unit;
+const CENTRED = 0.6;  // scale of the picture around the centre of mass, in which the box moves
 const mostZoom = () => Math.max(8, 0.3 * Math.min(...film.edges) / Math.min(...film.radii));
 
 function aim() {
-  if (camera.follow >= 0 && camera.zoom > 1) [camera.x, camera.y] = [X[camera.follow], Y[camera.follow]];
+  if (camera.zoom > 1 && isInside(camera.follow)) [camera.x, camera.y] = [X[camera.follow], Y[camera.follow]];
   view.unit = page.unit * camera.zoom;
-  [camera.x, camera.y] = [[camera.x, page.width], [camera.y, page.height]].map(([centre, size], axis) => {
+  if (isCentred()) {
+    const { x, y } = totals();
+    Object.assign(camera, { x, y });
+    view.unit *= CENTRED;
+  } else [camera.x, camera.y] = [[camera.x, page.width], [camera.y, page.height]].map(([centre, size], axis) => {
     const low = film.lower[axis], edge = film.edges[axis], half = size / 2 / view.unit, margin = page.margin / view.unit;
     if (film.periodic[axis]) return centre - edge * Math.floor((centre - low) / edge);
     const reach = Math.max(0, edge / 2 + margin - half);  // the camera does not leave a box with walls

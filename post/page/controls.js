@@ -1,6 +1,6 @@
 // ---------- settings that the user can change ----------
 
-const state = { playing: false, colour: '', traced: [], arrows: false, sofar: null, total: false };
+const state = { playing: false, colour: '', traced: [], arrows: false, sofar: null, total: false, momenta: true, centred: false };
 let pace;          // time of the film per second of real time, at speed 1
 let usual = true;  // whether the pace follows from the length and the speeds of this film
 
@@ -32,6 +32,7 @@ function prepareFilm() {
   $('speeds').hidden = !counted.length;
   $('sofar').hidden = film.speeds.rest;
   $('event').hidden = !source.hasEvents();
+  prepareEncounter();
 }
 
 // ---------- drawing ----------
@@ -40,6 +41,7 @@ let told = 0;  // when texts and plots were last drawn
 
 function show(time, anew = false) {
   move(time);
+  deselectAbsent();
   drawStage();
   if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return;  // texts and plots are updated less often than the disks
   told = performance.now();
@@ -47,22 +49,24 @@ function show(time, anew = false) {
   $('cursor').style.transform = `translateX(${Math.min(cursorAt(moment.time), $('energy').width / page.dots - 4)}px)`;
   drawHistogram();
   drawPressure();
+  drawInside();
   tellNumbers();
   tellEnergies();
   tell();
   tellQueue();
+  tellEncounter();
   if (!state.playing) describe();
 }
 
 function layout() {
   if (!film || !$('main').clientWidth) return;  // there is no film yet, or it is not visible
   tell();  // the stage takes the space that plots and texts leave
-  $('pressures').hidden = false;  // visible, so that it can be measured
+  $('pressures').hidden = $('population').hidden = false;  // visible, so that they can be measured
   layOutStage();
   drawLegend();  // its texts depend on the size of the disks on the screen
   tellLimits();
   layOutStage();
-  for (const canvas of ['histogram', 'energy', 'pressure'].map($)) {
+  for (const canvas of ['histogram', 'energy', 'pressure', 'inside', 'polygon'].map($)) {
     const { clientWidth, clientHeight } = canvas;  // read once, because reading it forces a layout
     Object.assign(canvas, { width: Math.round(clientWidth * page.dots), height: Math.round(clientHeight * page.dots) });
   }
@@ -166,14 +170,14 @@ function zoomBy(factor, px, py) {
 
 // ---------- in the laboratory: dragging of a side during the simulation, or of a disk during a pause ----------
 
-// { side } or { disk }, the pointer, its first position, the distance from there to the side or disk, and when the worker was last told [ms]
+// { side }, { disk } or { tip } of an arrow, the pointer, its first position, the distance from there to the side, disk or tip, and when the worker was last told [ms]
 let grabbed = null;
 const GRIP = 14;  // greatest distance of the mouse from the side that it drags [CSS pixels]
 const CURSORS = ['ew-resize', 'ns-resize'];  // over a vertical and a horizontal side
 const HOLDABLE = [undefined, 'still', 'constant_velocity', 'piston'], TOLD_AGAIN = 100;
 const isFinger = ({ pointerType }) => pointerType === 'touch', reachOf = (event, mouse) => isFinger(event) ? 22 : mouse;  // [CSS pixels]
 
-const canHold = k => !film.periodic[k >> 1] && HOLDABLE.includes(film.sides[k].motion);
+const canHold = k => !film.periodic[k >> 1] && !past.at(-1)?.open[k] && HOLDABLE.includes(film.sides[k].motion);
 
 // Returns the number of the side near a point of the canvas, or -1 if there is none that the user can drag now.
 function sideAt(px, py, event) {
@@ -188,8 +192,10 @@ function sideAt(px, py, event) {
 function grabAt(px, py, event) {
   if (!isPart) return null;
   const own = { pointer: event.pointerId, from: [px, py] }, away = (x, y) => [x - backAcross(px), y - backUp(py)];
-  if (!state.playing && moment.time === last()) {
-    const i = isFinger(event) ? diskAt(px, py, reachOf(event), state.traced) : diskAt(px, py, 0);
+  const tip = tipAt(px, py, event);
+  if (tip !== null) return { ...own, tip, away: away(...tipOf(tip)) };
+  if (!state.playing && moment.time === last() && !isCentred()) {
+    const i = isFinger(event) && !isEncounter() ? diskAt(px, py, reachOf(event), state.traced) : diskAt(px, py, 0);
     return i === null ? null : { ...own, disk: i, away: away(X[i], Y[i]) };
   }
   const side = sideAt(px, py, event), place = side < 0 ? 0 : sidesAt(moment.shown)[side];
@@ -201,9 +207,13 @@ function grabAt(px, py, event) {
 const keepsFromScrolling = () => grabbed !== null && !(grabbed.side < 2);
 
 function drag(px, py) {
-  const { side, disk, from, away, told } = grabbed, to = [backAcross(px) + away[0], backUp(py) + away[1]];
+  const { side, disk, tip, from, away, told } = grabbed, to = [backAcross(px) + away[0], backUp(py) + away[1]];
+  if (tip !== undefined) {
+    dragTip(tip, ...to);
+    return;
+  }
   if (disk !== undefined) {
-    [X[disk], Y[disk]] = grabbed.to = to;
+    [X[disk], Y[disk]] = grabbed.to = isEncounter() ? to.map(one => toStep(one, stepOf(film.edges[0]) / 5)) : to;
     drawStage();
     return;
   }
@@ -215,16 +225,20 @@ function drag(px, py) {
 
 // Ends the dragging. A gesture that the browser cancels leaves a disk where it was.
 function release(cancelled) {
-  const { side, disk, to, told } = grabbed;
+  const { side, disk, tip, to, velocity, told } = grabbed;
   grabbed = null;
   if (side !== undefined && told >= 0) send({ do: 'hold', side, to: null });
-  if (to && cancelled) show(moment.time, true);
-  else if (to) send({ do: 'place', disk, position: to });
+  if ((to || velocity) && cancelled) show(moment.time, true);
+  else if (velocity) redefine(tip, 'velocity', velocity);
+  else if (to) redefine(disk, 'position', to);
 }
 
 function pointerMoved(event) {
   const before = pointers.get(event.pointerId), here = onStage(event);
-  if (!before) { $('stage').style.cursor = CURSORS[sideAt(...here, event) >> 1] ?? ''; return; }
+  if (!before) {
+    $('stage').style.cursor = tipAt(...here, event) !== null ? 'grab' : CURSORS[sideAt(...here, event) >> 1] ?? '';
+    return;
+  }
   const others = [...pointers].filter(([id]) => id !== event.pointerId).map(([, place]) => place);
   pointers.set(event.pointerId, here);
   const dx = here[0] - before[0], dy = here[1] - before[1];
@@ -267,6 +281,15 @@ function trace(some) {
   look();
 }
 
+// A disk that leaves the box is no longer selected, unless the film was made to show its path.
+function deselectAbsent() {
+  const isKept = i => isInside(i) || film.traced?.includes(i);
+  if (state.traced.every(isKept)) return;
+  state.traced = state.traced.filter(isKept);
+  if (!isKept(camera.follow)) camera.follow = -1;
+  press({ follow: camera.follow >= 0 });
+}
+
 function followOrNot() {
   camera.follow = camera.follow < 0 ? state.traced[0] : -1;
   if (camera.follow >= 0 && camera.zoom === 1) camera.zoom = Math.min(4, mostZoom());
@@ -298,6 +321,7 @@ function listen() {
   for (const button of document.querySelectorAll('[data-path]'))
     button.innerHTML = `<svg viewBox="0 0 24 24"><path d="${button.dataset.path}"/></svg>`;
   for (const [id, action] of Object.entries(actions)) on(id, action);
+  listenEncounter();
   $('full').hidden = !document.fullscreenEnabled;
   onSlide($('scrub'), () => go(first() + $('scrub').value * (last() - first())));
   onSlide($('pace'), () => { follow(false); refresh(); if (isPart) parent.paced(window); });

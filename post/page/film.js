@@ -11,7 +11,7 @@ let angles;                     // orientations at the present moment, if the di
 let source;                     // where frames and events come from: a file or a worker
 let past = [];                  // the frames: time, position and velocity (x1 y1 x2 y2 ...), angle, periods crossed since the first frame, ...
 let origins;                    // the positions x1 y1 x2 y2 ... from which displacements are measured
-const moment = { time: 0, shown: 0, frame: 0, kinetic: [], potential: [], collisions: 0 };
+const moment = { time: 0, shown: 0, frame: 0, inside: [], kinetic: [], potential: [], collisions: 0 };  // `inside`: disks of each species in the box
 
 function bytes(text) {
   const letters = atob(text), array = new Uint8Array(letters.length);
@@ -26,12 +26,17 @@ function setScene(facts, blocks) {
   speciesOf = new Uint16Array(bytes(blocks.species).buffer);
   sizeOf = bytes(blocks.sizes);
   masses = new Float32Array(bytes(blocks.mass).buffer);
+  film.atStart = film.sides;
   disks = speciesOf.length;
   [X, Y, VX, VY, UX, UY, HITS] = Array.from({ length: 7 }, () => new Float64Array(disks));
   past = [];
 }
 
+// The position of a disk outside of the box is NaN, and no such disk is drawn.
+const isInside = i => !isNaN(X[i]);
+
 const first = () => past[0].time, last = () => past.at(-1).time;
+const sumOf = values => values.reduce((sum, one) => sum + one, 0);
 const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
 
 // Returns the number of elements of a sorted list that do not exceed a value, found by binary search.
@@ -51,7 +56,7 @@ const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
 // y2 and so on. For each coordinate of a disk, the function `moved` returns the number of periods crossed since the previous frame.
 function cross(frame, moved) {
   const before = past.at(-1);
-  if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);
+  if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);  // 0 for a disk outside
   return frame;
 }
 
@@ -100,13 +105,21 @@ function move(time) {
     if (angles) angles[i] = here.angle[i] + (share && share * (then.angle[i] - here.angle[i]));
   }
   moment.collisions = events?.when.length ? past[0].collisions + 2 * events.pairs[upTo(events.when, moment.shown)] / disks : here.collisions;
-  const kinetic = kinds.map(() => 0), potential = kinds.map(() => 0), mean = (sum, s) => sum / kinds[s].count;
+  const kinetic = kinds.map(() => 0), potential = kinds.map(() => 0), inside = kinds.map(({ count }) => count), { isOpen } = film;
   for (let i = 0; i < disks; i++) {
+    if (isOpen && !isInside(i)) {
+      inside[speciesOf[i]]--;
+      continue;
+    }
     kinetic[speciesOf[i]] += 0.5 * masses[i] * (VX[i] * VX[i] + VY[i] * VY[i]);
     potential[speciesOf[i]] -= masses[i] * (gx * (UX[i] + (crossed ? width * crossed[2 * i] : 0)) + gy * (UY[i] + (crossed ? height * crossed[2 * i + 1] : 0)));
   }
-  Object.assign(moment, { kinetic: kinetic.map(mean), potential: potential.map(mean) });
+  const mean = (sum, s) => inside[s] ? sum / inside[s] : null;
+  Object.assign(moment, { inside, kinetic: kinetic.map(mean), potential: potential.map(mean) });
 }
+
+// Returns for each side whether it is open, at the time shown.
+const openSides = () => past[moment.frame].open ?? film.open.findLast(([time]) => time <= moment.shown)[1];
 
 // Returns the positions of the left, right, bottom and top side of the box at a given time. The returned positions of the sides are
 // used only for drawing.
@@ -131,12 +144,12 @@ function displacement(i) {
 
 // Returns the free flights of a disk between two times. Each flight has a start, an end, and the offset of the control point of a
 // parabola, which is (0, 0) for a straight line. Without an event log, the flights are straight lines between the positions in
-// successive frames. If a disk has been recycled between two frames, its path between these frames is left out.
+// successive frames. If a disk has been recycled between two frames, its path between these frames is left out. So is the path of a disk that is outside of the box.
 function flights(i, from, to) {
   const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
   for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {
     const here = past[k], then = past[k + 1], h = then.time - here.time, own = [], { start, disk, turns } = ways ?? {};
-    if (here.recycled && here.recycled[i] !== then.recycled[i]) continue;
+    if (isNaN(here.place[2 * i]) || (isNaN(then.place[2 * i]) && !film.known) || (here.recycled && here.recycled[i] !== then.recycled[i])) continue;
     const pair = array => [array[2 * i], array[2 * i + 1]], g = film.known ? film.gravity : [0, 0];
     let place = pair(here.place), velocity = pair(here.velocity), since = 0;
     if (!film.known) velocity = pair(then.place).map((end, axis) => (end - place[axis] + (here.crossed ? film.edges[axis] * (then.crossed[2 * i + axis] - here.crossed[2 * i + axis]) : 0)) / h);
@@ -153,13 +166,11 @@ function flights(i, from, to) {
 }
 
 // Calls `action` for the speed of each disk in each frame received so far. If there are very many frames, the speeds of only a part
-// of the frames are used. Returns the number of frames whose speeds were passed to `action`.
+// of the frames are used.
 function eachSpeed(action) {
   const some = Math.ceil((moment.frame + 1) * disks / 2e6);
-  let samples = 0;
-  for (let k = moment.frame; k >= 0; k -= some, samples++)
-    for (let i = 0, { velocity } = past[k]; i < disks; i++) action(i, Math.hypot(velocity[2 * i], velocity[2 * i + 1]));
-  return samples;
+  for (let k = moment.frame; k >= 0; k -= some)
+    for (let i = 0, { place, velocity } = past[k]; i < disks; i++) if (!isNaN(place[2 * i])) action(i, Math.hypot(velocity[2 * i], velocity[2 * i + 1]));
 }
 
 // ---------- film of a run that is stored in a file ----------
@@ -171,12 +182,12 @@ function loadFilm({ facts, blocks }) {
   const { exact, time, lower, edges } = film, real = exact ? Float64Array : Float32Array;
   const block = (name, kind) => new kind(bytes(blocks[name] ?? '').buffer), part = (array, k, width) => array?.subarray(k * width, (k + 1) * width);
   const positions = block('positions', exact ? Float64Array : Uint16Array), velocities = block('velocities', exact ? Float64Array : Int16Array);
-  const fastest = block('fastest', Float64Array), [shifts, hits, counts] = ['shifts', 'hits', 'recycled'].map(name => blocks[name] && bytes(blocks[name]));
+  const fastest = block('fastest', Float64Array), [shifts, hits, counts, present] = ['shifts', 'hits', 'recycled', 'present'].map(name => blocks[name] && bytes(blocks[name]));
   const turned = blocks.angles && block('angles', Float32Array);
   const signs = (before, k) => (shifts[past.length * disks + (k >> 1)] >> (k % 2 ? 0 : 4) & 15) - 8;
   time.forEach((when, k) => past.push(cross({
     time: when, collisions: film.collisions[k], hits: part(hits, k, disks), angle: part(turned, k, disks), recycled: part(counts, k, disks),
-    place: real.from(part(positions, k, 2 * disks), (one, n) => lower[n % 2] + edges[n % 2] * one / (exact ? 1 : 65535)),
+    place: real.from(part(positions, k, 2 * disks), (one, n) => present?.[k * disks + (n >> 1)] === 0 ? NaN : lower[n % 2] + edges[n % 2] * one / (exact ? 1 : 65535)),
     velocity: real.from(part(velocities, k, 2 * disks), one => exact ? one : one * fastest[k] / 32767),
   }, signs)));
   angles = turned && new Float32Array(disks);

@@ -14,7 +14,7 @@ const state = {
   paused: false, started: false, note: '',   // whether the films are paused, and the input has a run; what is wrong with the address
 };
 // The variables in this list can be changed while a simulation runs. A change of any other variable starts a new run.
-const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|surface_velocity|velocity|mass|force))/.test(key);
+const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|surface_velocity|velocity|mass|force|open)|source\.\w+\.(count|interval|velocity|temperature|\w+_time))/.test(key);
 const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', virial_pressure: 'pressure', dissipated_energy: 'energy lost per time', collisions: 'collisions per time' };
 const IMPOSSIBLE = 'One value is not possible: the form says why.';
 const MOST_KEPT = 3, FULL = 0.5;  // number of kept runs; packing fraction that random placement reaches easily
@@ -32,18 +32,7 @@ function tell(text, wrong = false) {
 
 const short = value => String(+(+value).toPrecision(3)).replace('-', '−');
 
-// ---------- values ----------
-
-const givenIn = place => state.groups.find(group => group.place === place)?.given ?? {};
-const placeOf = key => key.slice(0, key.lastIndexOf('.')), nameOf = key => key.slice(key.lastIndexOf('.') + 1);
-const variableOf = key => lab.table[key.split('.')[0]][nameOf(key)];
-const words = value => value === null || value === undefined ? '' : [value].flat().map(one => typeof one === 'boolean' ? `.${one}.` : String(one)).join(',');
-const givenAs = key => givenIn(placeOf(key))[nameOf(key)] ?? '';
-const textOf = key => state.settings[key] ?? givenAs(key);
-const valueOf = key => textOf(key) || words(variableOf(key).default ?? variableOf(key).example);
-const split = text => text.split(/\s*,\s*|\s+/).flatMap(one => /^[2-9]\*./.test(one) ? Array(+one[0]).fill(one.slice(2)) : one);
-const numberOf = (key, at = 0) => parseFloat(split(valueOf(key))[at]?.replace(/d/i, 'e'));
-const shownOf = key => state.waiting[key]?.text ?? textOf(key);
+// ---------- changes of values ----------
 
 function set(key, text) {
   const old = textOf(key);
@@ -60,6 +49,7 @@ const differs = key => (state.settings[key] ?? givenAs(key)) !== (state.has[key]
 
 // Returns a variable and its value as text; the label of the slider is used or, without a slider, the name of the variable.
 function inWords([key, value]) {
+  if (/^side\.\w+\.open$/.test(key)) return doorInWords(key, value);
   const slider = state.input.sliders.find(one => one.key === key);
   return `${slider ? slider.words.replace(/ \(.*/, '') : key} = ${slider?.at >= 0 ? split(value)[slider.at] : value}`;
 }
@@ -154,15 +144,18 @@ function buildEverything() {
 }
 
 function buildVariable(key) {
-  const { choices, type, help, allowed, unit } = variableOf(key), id = 'v.' + key, fallback = words(variableOf(key).default ?? variableOf(key).example);
+  const { choices, type, help, allowed, unit, default: usual, example } = variableOf(key), id = 'v.' + key;
   const menu = type === 'logical' ? ['.true.', '.false.'] : choices?.length && variableOf(key).size === 1 ? choices : null;
-  const input = menu ? make('select', { id }, ...['', ...menu].map(word => new Option(word || `(${fallback})`, word))) : make('input', { id, placeholder: fallback, spellcheck: false });
+  const input = menu ? make('select', { id }, ...['', ...menu].map(word => new Option(word, word))) : make('input', { id, spellcheck: false });
+  const more = usual === null && words(example) ? ` Example: ${words(example)}.` : '';
   const row = make('div', { className: 'variable' }, make('label', { htmlFor: id, textContent: nameOf(key) + (unit ? ` [${unit}]` : '') }),
-    input, make('p', { id: id + '.help', textContent: `${help} Allowed: ${allowed}.` }), make('p', { className: 'problem' }));
+    input, make('p', { id: id + '.help', textContent: `${help} Allowed: ${allowed}.${more}` }), make('p', { className: 'problem' }));
   row.dataset.place = key;
   input.setAttribute('aria-describedby', id + '.help');
   input.addEventListener('change', () => set(key, input.value.trim()));
   row.sync = () => {
+    const fallback = defaultInWords(key);
+    if (menu) input.options[0].text = `(${fallback})`; else input.placeholder = fallback;
     if (document.activeElement !== input || menu) input.value = shownOf(key);
     mark(row, key);
   };
@@ -215,8 +208,8 @@ async function choose(name, settings = {}) {
 
 // Starts a run with the values of variables in the address of the page. Groups that the input file lacks are added.
 function begin(settings) {
-  const isKnown = key => key.split('.').length > 1 && lab.table[key.split('.')[0]]?.[nameOf(key)], keys = Object.keys(settings), wrong = keys.find(key => !isKnown(key));
-  state.settings = Object.fromEntries(keys.filter(isKnown).map(key => [key, settings[key]]));
+  const keys = Object.keys(settings), wrong = keys.find(key => !isVariable(key));
+  state.settings = Object.fromEntries(keys.filter(isVariable).map(key => [key, settings[key]]));
   const places = [...new Set(Object.keys(state.settings).map(placeOf))].filter(place => place.includes('.') && !state.groups.some(group => group.place === place));
   state.added = places.map(place => [place.split('.')[0], place.slice(place.indexOf('.') + 1)]);
   run();
@@ -274,7 +267,8 @@ function run() {
   if (busy && isThere(box)) filmOf(box).leave();
   busy = now;
   tell('');
-  state.paused = false;
+  state.paused = !!state.input.paused;  // the film of some inputs waits at its start
+  tellPause();
   const begin = () => {
     box.frame.onload = null;
     if (!box.run) dress();
@@ -297,6 +291,7 @@ function changed(key) {
 function hear(source, news) {
   const box = state.boxes.find(one => one.frame.contentWindow === source);
   if (!box) return;
+  if (news.is === 'scene' && box === current()) buildDoors(news.facts);
   if (news.is === 'scene' && !news.changed) {
     Object.assign(box, { run: news.run, words: box.wished.words, changes: [] });
     Object.assign(state, { has: { ...box.wished.settings }, started: true });
@@ -408,7 +403,8 @@ const leader = () => isThere(current()) && filmOf(current()).inside().film ? cur
 // the other runs.
 function arrangeAll() {
   const boxes = shownBoxes(), many = isComparing(), { clientWidth, clientHeight } = $('runs');
-  const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor((clientWidth - scrollBar) / count);
+  const upright = clientWidth < 560, count = many ? boxes.length : 1, edge = parseFloat(getComputedStyle($('runs')).paddingLeft);
+  const width = Math.floor((clientWidth - 2 * edge - scrollBar) / count);
   const shapes = films().map(one => one.inside().film?.edges).filter(Boolean).map(([x, y]) => y / x), highest = clientHeight * (upright ? 0.36 : 0.42) - 26;
   const size = { width: width - 12, height: Math.floor(Math.min(highest, (width - 12) * Math.max(0.5, ...shapes))) }, lead = leader();
   $('runs').classList.toggle('many', many);
@@ -424,9 +420,16 @@ function arrangeAll() {
     box.figure.firstChild.style.marginLeft = `${left}px`;
     if (isThere(box)) filmOf(box).arrange(many ? { ...size, left } : null, bare);
   }
+  scrolled();
   tellShelf();
   overlayAll();
   drawScan();
+}
+
+// Moves the pictures of the other runs together with the page of the run that contains the plots.
+function scrolled() {
+  const by = isComparing() ? Math.max(0, filmOf(leader()).scrollY) : 0;
+  $('runs').style.setProperty('--scrolled', `${by}px`);
 }
 
 function overlayAll() {
@@ -482,8 +485,10 @@ function went(source, time) {
 function played(source, on) {
   if (source === filmOf(current())) state.paused = !on;
   for (const one of films()) if (one !== source && one.inside().film) one.play(on);
-  $('pause').textContent = on ? 'Pause' : 'Go on';
+  tellPause();
 }
+
+function tellPause() { $('pause').textContent = state.paused ? 'Go on' : 'Pause'; }
 
 function paced(source) {
   const { pace, speed } = source.choices();

@@ -52,7 +52,10 @@ function follow(newest) {
 listen();
 document.documentElement.classList.toggle('part', isPart);
 document.documentElement.classList.toggle('empty', isPart);
-if (isPart) addEventListener('keydown', event => parent.typed(event));
+if (isPart) {
+  addEventListener('keydown', event => parent.typed(event));
+  addEventListener('scroll', () => parent.scrolled?.(), { passive: true });
+}
 $('film').remove();
 if (enclosed) {
   loadFilm(enclosed);

@@ -11,34 +11,46 @@ function tell() {
   const { time, collisions } = moment;
   const share = (time - first()) / (last() - first() || 1);
   $('scrub').value = share;
+  markChanges();
   $('scrub').setAttribute('aria-valuetext', `time ${short(time)} of ${short(last())}`);
   $('clock').innerHTML = `t = <b>${long(+moment.shown.toPrecision(5))}</b><span class="counted"> · ${source.counted()}</span>`
-    + (disks > 1 ? `<span> · ${short(+collisions.toPrecision(3))} collisions per disk</span>` : '');
+    + (film.isOpen ? `<span> · ${sumOf(moment.inside)} disks inside</span>` : disks > 1 ? `<span> · ${short(+collisions.toPrecision(3))} collisions per disk</span>` : '');
   $('traced').hidden = !state.traced.length;
   $('hint').textContent = state.traced.length ? '' : hint();
-  $('push').hidden = !isPart || state.traced.length !== 1;
+  $('push').hidden = !isPart || state.traced.length !== 1 || !isInside(state.traced[0]);
   $('disk').innerHTML = state.traced.map(i =>
-    `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
+    `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) ${isInside(i) ? `at <b>${short(X[i])}, ${short(Y[i])}</b>` : 'is outside'}`).join('<br>');
+}
+
+// Marks the times of the changes of the run behind the time line: browsers draw no background of a slider itself. The thumb of the
+// slider is 16 pixels wide, and a mark 2.
+function markChanges() {
+  const shares = film.changes.map(([time]) => (time - first()) / (last() - first() || 1)).filter(share => share >= 0 && share <= 1);
+  const marks = shares.map(share => `linear-gradient(var(--accent), var(--accent)) calc(7px + ${share} * (100% - 14px)) 50% / 2px 60% no-repeat`);
+  if ($('marked').marks === marks.join()) return;
+  $('marked').style.background = $('marked').marks = marks.join();
+  $('scrub').title = film.changes.map(([time, words]) => `t = ${short(time)}: ${words}`).join('\n');
 }
 
 // Returns the words that stand below the controls while no disk is selected.
 function hint() {
   if (!isPart) return 'Select a disk to see its trace.';
-  if (!state.playing) return 'Drag a disk, or select it to see its trace.';
+  if (!state.playing) return `Drag a disk${canAim() ? ' or the end of its arrow' : ''}, or select it to see its trace.`;
   return `${film.sides.some((_, k) => canHold(k)) ? 'Drag a side of the box, or select' : 'Select'} a disk to see its trace.`;
 }
 
 // Writes descriptions of the picture and of each plot for screen readers.
 const listed = words => words.filter(Boolean).join(', ');
 function describe() {
-  const [width, height] = film.edges, each = kinds.map(({ name, count, sizes }) => `${count} ${name} (${sizes})`);
-  const surfaces = film.sides.map((law, k) => describeLaw(film.surfaces[k], law));
-  const kinetic = kinds.map(({ name }, s) => `${name} ${short(moment.kinetic[s])}`), pressure = lastOf('pressure');
+  const [width, height] = film.edges, each = kinds.map(({ name, sizes }, s) => `${moment.inside[s]} ${name} (${sizes})`);
+  const surfaces = film.sides.map((law, k) => openSides()[k] ? `${film.surfaces[k]} is open` : describeLaw(film.surfaces[k], law));
+  const kinetic = kinds.map(({ name }, s) => moment.kinetic[s] !== null && `${name} ${short(moment.kinetic[s])}`), pressure = lastOf('pressure');
   const words = {
     stage: `${listed(each)} in a box of ${short(width)} by ${short(height)}; time ${short(moment.shown)}; `
       + `coloured by ${state.colour}. ${listed(surfaces)} A click on a disk shows its trace.`,
     histogram: `Histogram of the speeds. ${$('bars').textContent}`,
     energy: `Energies against time. Mean kinetic energy of a disk now: ${listed(kinetic)}.`,
+    inside: `Numbers of disks against time. ${$('flows').textContent}`,
     pressure: `Pressure against time.${pressure === null ? '' : ` Now: ${short(pressure)}.`}`,
   };
   for (const [id, text] of Object.entries(words)) $(id).setAttribute('aria-label', text);
@@ -74,8 +86,8 @@ function drawLegend() {
     legend.querySelector('i').style.background = `linear-gradient(to right, ${stops})`;  // the security policy of the page refuses inline styles
   }
   // The motion is that at the start: a note about a side that is dragged would change the size of the picture meanwhile.
-  const sides = film.sides.map((law, k) => ({ ...law, motion: (film.atStart ?? film.sides)[k].motion }));
-  const notes = [scale?.[0], ...sides.map((law, k) => describeLaw(film.surfaces[k], law))].filter(Boolean);
+  const sides = film.sides.map((law, k) => ({ ...law, motion: film.atStart[k].motion }));
+  const notes = [scale?.[0], film.sides.some(({ open }) => open !== undefined) && 'dotted: open side', ...sides.map((law, k) => describeLaw(film.surfaces[k], law))].filter(Boolean);
   if (notes.length) legend.append(Object.assign(document.createElement('p'), { textContent: notes.join('; ') }));
 }
 
@@ -149,7 +161,7 @@ function plotLines(canvas, lines, now) {
       pen.stroke();
     }
     pen.globalAlpha = 1;
-    if (letter) pen.fillText(letter, Math.min(plot.right, x(time.at(-1)) + 10), y(values.at(-1) ?? 0) - 12);
+    if (letter) pen.fillText(letter, Math.min(plot.right, x(time.at(-1)) + 10), Math.max(y(values.at(-1) ?? 0) - 12, 0));
   }
   pen.setLineDash([]);
   return x;
@@ -176,37 +188,41 @@ function setBins(most, resting) {
 // time shown, or as means over all frames received so far.
 function speedsNow() {
   const { edges, rest } = film.speeds, bins = edges.length - 1, width = edges[1] - edges[0];
-  const bin = speed => rest ? speed > 0 ? Math.max(1, upTo(edges, speed)) : 0 : Math.floor(speed / width);
+  const seen = kinds.map(() => 0), bin = speed => rest ? speed > 0 ? Math.max(1, upTo(edges, speed)) : 0 : Math.floor(speed / width);
   const counts = kinds.map(() => new Float64Array(bins + 1)), add = (i, speed) => {
     const k = bin(speed);
+    seen[speciesOf[i]]++;
     if (k <= bins) counts[speciesOf[i]][k]++;
   };
   if (state.sofar) {
-    if (sums?.time !== moment.time) sums = { time: moment.time, samples: eachSpeed(add), counts };
+    if (sums?.time !== moment.time) {
+      eachSpeed(add);
+      sums = { time: moment.time, counts, seen };
+    }
     return sums;
   }
-  for (let i = 0; i < disks; i++) add(i, Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]));
-  return { samples: 1, counts };
+  for (let i = 0; i < disks; i++) if (isInside(i)) add(i, Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]));
+  return { counts, seen };
 }
 
 function drawHistogram() {
   if (!counted.length) return;
-  const { edges, rest } = film.speeds, { counts, samples } = speedsNow(), plot = prepare($('histogram')), { pen } = plot;
-  const others = overlaid.map(one => ({ letter: one.letter, ...one.speeds() })).filter(one => one.rest === rest);
+  const own = speedsOfFilm(), { edges, rest, counts, seen } = own, plot = prepare($('histogram')), { pen } = plot;
+  const others = overlaid.map(one => ({ letter: one.letter, ...one.speeds() })).filter(one => one.rest === rest), all = [own, ...others];
   if (rest) {
-    drawSpeedsAndRest(plot, counts, others);
+    drawSpeedsAndRest(plot, counts, seen, others);
     return;
   }
   tellBars();
-  const top = Math.max(edges.at(-1), ...others.map(one => one.edges.at(-1))), width = edges[1], energy = s => settled() ? film.curves?.mean?.[s] ?? moment.kinetic[s] : moment.kinetic[s];
-  const peak = Math.max(...counted.map(s => Math.sqrt(kinds[s].mass / (energy(s) || Infinity)) * Math.exp(-0.5)));
+  const top = Math.max(...all.map(one => one.edges.at(-1))), width = edges[1];
+  const peak = Math.max(...all.flatMap(one => one.counted.map(s => Math.sqrt(narrowness(one, s)) * Math.exp(-0.5))));
   const { x, y } = axes(plot, [0, top], [0, peak > 0 ? 1.6 * peak : 4 / top], 'speed');
   pen.save();
   pen.beginPath();
   pen.rect(plot.left, plot.top, plot.right - plot.left, plot.bottom - plot.top);
   pen.clip();
   for (const s of counted) {
-    const one = 1 / (kinds[s].count * samples * width);
+    const one = 1 / (seen[s] * width);
     pen.fillStyle = css(speciesColour(kinds[s]));
     pen.globalAlpha = 0.45;
     pen.beginPath();
@@ -214,21 +230,26 @@ function drawHistogram() {
     pen.fill();
   }
   pen.globalAlpha = 1;
-  for (const s of settled() ? counted : []) {
-    const b = kinds[s].mass / energy(s);
-    if (!isFinite(b)) continue;
-    Object.assign(pen, { lineWidth: 2, strokeStyle: css(speciesColour(kinds[s])) });
-    pen.setLineDash(DASHES[s % DASHES.length]);
-    pen.beginPath();
-    for (let k = 0; k <= 120; k++) {
-      const v = k / 120 * top;
-      pen.lineTo(x(v), y(b * v * Math.exp(-b * v * v / 2)));
-    }
-    pen.stroke();
-  }
-  const density = (n, bin, one, s) => y(n / (one.kinds[s].count * one.samples * (one.edges[bin + 1] - one.edges[bin])));
+  for (const one of all) if (one.settled) for (const s of one.counted) drawMaxwell(pen, one, s, x, y, top);
+  const density = (n, bin, one, s) => y(n / (one.seen[s] * (one.edges[bin + 1] - one.edges[bin])));
   others.forEach(one => drawOutline(pen, one, x, density, 0));
   pen.restore();
+}
+
+// Returns m/E of a species with the mean kinetic energy E. Its Maxwell distribution has the maximum √(m/E) e^(−1/2).
+const narrowness = ({ kinds: own, energies }, s) => own[s].mass / (energies[s] || Infinity);
+
+function drawMaxwell(pen, one, s, x, y, top) {
+  const b = narrowness(one, s);
+  if (!(b > 0)) return;
+  Object.assign(pen, { lineWidth: one.letter ? 1.2 : 2, strokeStyle: css(speciesColour(kinds[s % kinds.length])) });
+  pen.setLineDash(DASHES[s % DASHES.length]);
+  pen.beginPath();
+  for (let k = 0; k <= 120; k++) {
+    const v = k / 120 * top;
+    pen.lineTo(x(v), y(b * v * Math.exp(-b * v * v / 2)));
+  }
+  pen.stroke();
 }
 
 function tellBars() {
@@ -236,8 +257,12 @@ function tellBars() {
   if ($('bars').textContent !== words) $('bars').textContent = words;
 }
 
-// Returns the histogram of speeds of this film, for drawing in other films that are shown at the same time.
-const speedsOfFilm = () => ({ kinds, ...film.speeds, ...speedsNow() });
+// Returns the histogram of the speeds of the disks in this film, and the energies of its Maxwell curves. Other films on the page draw
+// both for comparison.
+function speedsOfFilm() {
+  const isSettled = settled(), energies = kinds.map((_, s) => (isSettled ? film.curves?.mean?.[s] : null) ?? moment.kinetic[s]);
+  return { kinds, counted, settled: isSettled, energies, ...film.speeds, ...speedsNow() };
+}
 
 // Draws the histogram of speeds of a compared run as a line above the bars, and labels the line with the letter of the run.
 function drawOutline(pen, one, x, height, from) {
@@ -253,12 +278,12 @@ function drawOutline(pen, one, x, height, from) {
       if (top < best[1]) best = [x(one.edges[bin]), top];
     });
     pen.stroke();
-    pen.fillText(one.letter, best[0], Math.max(best[1] - 13, 4));
+    pen.fillText(one.letter, best[0], Math.max(best[1] - 13, 8));
   });
 }
 
 // If many disks are at rest, both axes are logarithmic and no Maxwell curve is drawn.
-function drawSpeedsAndRest(plot, counts, others) {
+function drawSpeedsAndRest(plot, counts, seen, others) {
   const edges = film.speeds.edges.map(Math.log10), most = Math.log10(1.5 * Math.max(10, ...kinds.map(kind => kind.count)));
   const { pen } = plot, power = value => short(+(10 ** value).toPrecision(1));
   const { x, y } = axes(plot, [edges[0], edges.at(-1)], [-0.3, most], 'speed', value => Number.isInteger(value) ? power(value) : '');
@@ -269,7 +294,7 @@ function drawSpeedsAndRest(plot, counts, others) {
   }
   pen.globalAlpha = 1;
   others.forEach(one => drawOutline(pen, one, speed => x(Math.log10(speed)), n => y(n ? Math.log10(n) : -0.3), 1));
-  $('bars').textContent = `At rest: ${counted.map(s => `${counts[s][0]} of ${kinds[s].count} ${kinds[s].name}`).join(', ')}. `
+  $('bars').textContent = `At rest: ${counted.map(s => `${counts[s][0]} of ${seen[s]} ${kinds[s].name}`).join(', ')}. `
     + 'Bars: the number of disks at each speed; both axes grow by factors of ten.';
 }
 
@@ -279,7 +304,7 @@ const ENERGIES = { kinetic: [], potential: [5, 3], rotational: [1.5, 2.5] }, DAS
 let cursorAt;      // the map from times to pixels
 let overlaid = [];  // compared runs in the same plots: letter, curves, kinds, and functions for speeds and numbers at the moment shown
 
-const share = s => state.total ? kinds[s].count : 1;
+const share = s => state.total ? moment.inside[s] : 1;
 const there = () => Object.keys(ENERGIES).filter(kind => source.curves()[kind]);
 const lastOf = (name, s) => {
   const { time, [name]: all } = source.curves(), values = s === undefined ? all : all[s];
@@ -289,7 +314,7 @@ const lastOf = (name, s) => {
 function drawEnergies() {
   const lines = [], add = (curves, own, letter) => {
     for (const [name, dash] of Object.entries(ENERGIES)) curves[name]?.forEach((values, s) => lines.push({
-      time: curves.time, values: state.total ? values.map(e => e * own[s].count) : values,
+      time: curves.time, values: state.total ? values.map((e, k) => e === null ? e : e * (curves.inside?.[s][k] ?? own[s].count)) : values,
       colour: css(speciesColour(kinds[s % kinds.length])), dash, letter,
     }));
   };
@@ -309,6 +334,20 @@ function drawPressure() {
   $('force').textContent = now === null || now === undefined ? '' : short(now);
 }
 
+// Plots the numbers of disks inside an open system, and of those that left and entered so far.
+function drawInside() {
+  $('population').hidden = !film.isOpen;
+  if (!film.isOpen) return;
+  const ofRun = ({ time, inside, left, entered }, letter) => [
+    ...inside.map((values, s) => ({ time, values, letter, colour: css(speciesColour(kinds[s % kinds.length])) })),
+    ...[[left, ENERGIES.potential], [entered, ENERGIES.rotational]].filter(([values]) => values?.some(Boolean)).map(([values, dash]) => ({ time, values, letter, dash, colour: ink.soft })),
+  ];
+  const others = overlaid.filter(({ curves }) => curves.inside).flatMap(({ letter, curves }) => ofRun(curves, letter));
+  plotLines($('inside'), [...others, ...ofRun(source.curves())], overlaid.length ? Infinity : moment.time);
+  const soFar = name => lastOf(name) ?? 0, leaves = film.sides.some(({ open }) => open !== undefined);
+  $('flows').textContent = `Inside: ${moment.inside.join(' + ')}.${leaves ? ` Left (dashed): ${soFar('left')}.` : ''}${film.sources.length ? ` Entered (dotted): ${soFar('entered')}.` : ''}`;
+}
+
 function layTableOut() {
   const heads = ['', 'disks', ...there().map(name => name + { kinetic: '', potential: ' (dashed)', rotational: ' (dotted)' }[name])];
   const rows = kinds.map(({ count }) => ['', count, ...heads.slice(2).map(() => '')]);
@@ -322,6 +361,7 @@ function tellEnergies() {
     const now = name === 'rotational' ? lastOf(name, s) : moment[name][s];
     $('energies').rows[s + 1].cells[2 + k].textContent = now === null ? '' : short(now * share(s));
   }));
+  if (film.isOpen) kinds.forEach((_, s) => { $('energies').rows[s + 1].cells[1].textContent = moment.inside[s]; });
 }
 
 // ---------- table of measured values with errors, and theoretical values ----------
@@ -348,6 +388,7 @@ function speedsAndTemperature() {
   let mass = 0, px = 0, py = 0, energy = 0;
   const speeds = kinds.map(() => 0);
   for (let i = 0; i < disks; i++) {
+    if (!isInside(i)) continue;
     mass += masses[i];
     px += masses[i] * VX[i];
     py += masses[i] * VY[i];
@@ -355,7 +396,8 @@ function speedsAndTemperature() {
     speeds[speciesOf[i]] += Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]);
   }
   const thermal = energy - 0.5 * (px * px + py * py) / mass;  // relative to the mean motion
-  return [Math.max(0, thermal) / disks, ...speeds.map((sum, s) => sum / kinds[s].count)];
+  const mean = (sum, count) => count ? sum / count : null;
+  return [mean(Math.max(0, thermal), sumOf(moment.inside)), ...speeds.map((sum, s) => mean(sum, moment.inside[s]))];
 }
 
 // Returns name, present value, mean with error, and theoretical value of each quantity at the time shown.

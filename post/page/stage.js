@@ -97,7 +97,7 @@ const enlarged = () => film.radii.some(radius => radius * page.unit < leastRadiu
 function drawStage() {
   aim();
   radii = film.radii.map(radius => Math.max(leastRadius(), radius * view.unit));
-  const seen = [view.unit, view.x, view.y, ...sidesAt(moment.shown), sliding && moment.shown].join();
+  const seen = [view.unit, view.x, view.y, ...sidesAt(moment.shown), ...openSides(), sliding && moment.shown].join();
   if (groundShown !== seen) drawGround();
   groundShown = seen;
   drawDisks();
@@ -133,19 +133,19 @@ function drawGround() {
       ground.stroke(new Path2D(`M${across(a + dx)},${up(b + dy)}L${across(c + dx)},${up(d + dy)}`));
     }));
   });
-  // Periodic sides of the box are drawn as dashed lines. Thermal and sliding sides are drawn with a coloured band outside the box.
+  // Periodic sides of the box are drawn as dashed lines, and open sides as dotted lines. Thermal and sliding sides are drawn with a coloured band outside the box.
   copies([x0, x1], [y0, y1], (dx, dy) => {
     const left = across(x0 + dx), right = across(x1 + dx), bottom = up(y0 + dy), top = up(y1 + dy);
     [[left, bottom, left, top], [right, bottom, right, top], [left, bottom, right, bottom], [left, top, right, top]].forEach(([a, b, c, d], k) => {
-      const out = (k % 2 ? 1 : -1) * 5 * page.dots, [x, y] = k < 2 ? [out, 0] : [0, -out], periodic = film.periodic[k >> 1];
-      if (!periodic && drawLike(film.sides[k])) {
+      const out = (k % 2 ? 1 : -1) * 5 * page.dots, [x, y] = k < 2 ? [out, 0] : [0, -out], periodic = film.periodic[k >> 1], isOpen = openSides()[k];
+      if (!periodic && !isOpen && drawLike(film.sides[k])) {
         ground.lineWidth = 6 * page.dots;
         ground.stroke(new Path2D(`M${a + x},${b + y}L${c + x},${d + y}`));
       }
       ground.strokeStyle = ink.wall;
       ground.lineWidth = line;
       ground.lineDashOffset = 0;
-      ground.setLineDash(periodic ? [6 * page.dots, 5 * page.dots] : []);
+      ground.setLineDash((isOpen ? [1.5, 6] : periodic ? [6, 5] : []).map(length => length * page.dots));
       ground.stroke(new Path2D(`M${a},${b}L${c},${d}`));
     });
   });
@@ -263,10 +263,12 @@ function drawMarks() {
   if (!wanted) return;
   inBox(marks, () => {
     if (angles) drawRadii();
-    state.traced.forEach(drawTrace);
+    if (!isCentred()) state.traced.forEach(drawTrace);
+    if (film.events && !isCentred()) drawNextEvent();
+    if (isEncounter() && state.momenta) drawMomenta();
     if (state.arrows) drawArrows();
-    if (film.events) drawNextEvent();
     if (film.exact) drawNumbers();
+    drawHandles();
   });
   if (state.arrows) drawArrowKey();
 }
@@ -344,13 +346,13 @@ function drawPath(list, colour, width) {
 }
 
 // The arrow for a typical speed has the same length as the mean distance between neighbouring disks.
-const arrowScale = () => Math.sqrt(film.edges[0] * film.edges[1] / Math.max(10, disks)) * view.unit / film.scales.speed[1] / Math.sqrt(camera.zoom);
+const arrowScale = () => Math.sqrt(film.edges[0] * film.edges[1] / Math.max(10, disks)) * view.unit / arrowSpeed() / Math.sqrt(camera.zoom);
 
 function drawArrows() {
-  const length = arrowScale();
+  const length = arrowScale(), [ux, uy] = frameVelocity();
   marks.beginPath();
   for (let i = 0; i < disks; i++) {
-    const vx = VX[i] * length, vy = -VY[i] * length, size = Math.hypot(vx, vy);
+    const vx = (VX[i] - ux) * length, vy = (uy - VY[i]) * length, size = Math.hypot(vx, vy);
     if (size < 1) continue;
     const head = Math.min(6 * page.dots, 0.5 * size) / size, reach = size / view.unit;
     const r = radii[sizeOf[i]], hidden = r < 5 * page.dots ? Math.max(head, 1 - r / size) : 1;  // starts at the rim of a small disk
@@ -373,7 +375,7 @@ function drawArrows() {
 
 // Draws a reference arrow in the upper left corner, and beside the arrow the speed that corresponds to its length.
 function drawArrowKey() {
-  const speed = +film.scales.speed[1].toPrecision(1), size = speed * arrowScale(), { dots } = page, words = `speed ${short(speed)}`;
+  const speed = +arrowSpeed().toPrecision(1), size = speed * arrowScale(), { dots } = page, words = `speed ${short(speed)}`;
   marks.font = `${12 * dots}px system-ui, sans-serif`;
   Object.assign(marks, { textAlign: 'left', textBaseline: 'middle', fillStyle: ink.card, globalAlpha: 0.85 });
   marks.fillRect(6 * dots, 6 * dots, size + marks.measureText(words).width + 22 * dots, 22 * dots);

@@ -3,7 +3,7 @@
 // The page draws the newest frame. Earlier frames are kept, so that the user can go back to them. If the frames need too much
 // memory, every second frame of their older half is removed. If the user goes back and plays the film, the page first shows the
 // kept frames, and then new frames of the worker process.
-const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // memory for frames [bytes]; numbers before the positions of a message; samples of a plot
+const PAST_ROOM = 6e7, HEAD = 7, MOST_CURVE = 3000;  // memory for frames [bytes]; numbers before the positions of a message; samples of a plot
 const SAME_TIME = 1e-13;  // largest relative difference of two times of one moment
 const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
@@ -43,7 +43,7 @@ const hear = {
     const names = list => list?.map(({ name }) => name).join();
     if (names(kinds) === names(facts.species)) facts.colour = state.colour;
     if (changed) {
-      film = { ...film, ...facts, scales: film.scales, speeds: film.speeds };
+      film = { ...film, ...facts, changes: film.changes, scales: film.scales, speeds: film.speeds };
       kinds = film.species;
       prepareFilm();
       refresh();
@@ -59,8 +59,8 @@ const hear = {
     }
     curves.time.push(time);
     curves.news.push(news);
-    for (const name of Object.keys(ENERGIES)) curves[name]?.forEach((values, s) => values.push(news[name]?.[s] ?? null));
-    curves.pressure.push(news.pressure);
+    for (const name of [...Object.keys(ENERGIES), 'inside']) curves[name]?.forEach((values, s) => values.push(news[name]?.[s] ?? null));
+    for (const name of ['pressure', 'left', 'entered']) if (curves[name]) curves[name].push(news[name]);
     if (curves.time.length > MOST_CURVE) {
       const thin = list => Array.isArray(list?.[0]) ? list.map(thin) : list?.filter((_, k) => k % 2 === 0);
       for (const name of Object.keys(curves)) curves[name] = thin(curves[name]);
@@ -71,30 +71,37 @@ const hear = {
   events(news) {
     const own = ([time, i, j]) => [time, i - 1, j - 1];
     Object.assign(stream.events, { next: news.next.map(own), happened: news.happened && own(news.happened) });
+    encounter.collisions.push(...news.encounters);
     if (!state.playing && source) show(moment.time, true);
   },
-  state({ playing, ended, reason }) {
+  state({ playing, ended, reason, changes }) {
+    if (film && changes) film.changes = changes.map(([time, name, value]) => [time, name ? `${name} = ${value}` : value]);
     if (isStarting()) return;  // the message belongs to the previous run
     if (reason && past.length && !state.playing) show(moment.time, true);  // a refused disk returns to its place
     stream.ended = ended;
     if (!playing && state.playing && stream.live && past.length && !parent.isComparing()) play(false);
   },
-  problems({ change }) { if (!change) starts(false); },  // a refused change belongs to the previous run
+  problems({ change }) {
+    if (change) return;  // a refused change belongs to the previous run
+    starts(false);
+    if (past.length && !state.playing) show(moment.time, true);  // a refused disk or arrow returns to its place
+  },
   gone() { starts(false); stream.ended = true; },
 };
 
 function open({ facts, blocks, run }) {
-  setScene({ ...facts, atStart: facts.sides }, blocks);
+  setScene(facts, blocks);
   angles = facts.turning ? new Float32Array(disks) : null;
   const each = there => there ? kinds.map(() => []) : null;
-  const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), pressure: [], news: [] };
+  const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), inside: each(facts.isOpen), left: facts.isOpen ? [] : null, entered: facts.isOpen ? [] : null, pressure: [], news: [] };
   Object.assign(stream, { live: true, ended: false, curves, run, events: { next: [], happened: null } });
+  encounter.collisions = [];
   source = fromWorker;
 }
 
 // Adapts the scale of speeds when the disks have become much faster or slower, or when resting disks begin to move.
 function fitScales(mean) {
-  const [, top] = film.scales.speed, rest = VX.filter((vx, i) => vx === 0 && VY[i] === 0).length / disks;
+  const [, top] = film.scales.speed, rest = VX.filter((vx, i) => vx === 0 && VY[i] === 0).length / (sumOf(moment.inside) || 1);
   if ((rest > RESTING && rest < 1) === film.speeds.rest && !(mean > 0.8 * top) && !(mean && mean < 0.1 * top && !film.speeds.rest)) return;
   film.rest = rest;
   setTop(mean > 0.8 * top || mean < 0.1 * top ? 2.2 * mean || top : top);
@@ -104,14 +111,14 @@ function fitScales(mean) {
 }
 
 function setTop(top) {
-  film.scales = { speed: ['speed', top], ...!film.recycling && { displacement: ['displacement', Math.max(...film.edges) / 4] } };
+  film.scales = { speed: ['speed', top], ...!film.jumps && { displacement: ['displacement', Math.max(...film.edges) / 4] } };
   setBins(1.3 * top, film.rest);
 }
 
 function take(buffer) {
   if (stream.scene) { open(stream.scene); stream.scene = null; starts(false); }
   const head = new Float64Array(buffer, 0, HEAD), pairs = from => new Float32Array(buffer, 8 * HEAD + 8 * from * disks, 2 * disks);
-  const frame = { time: head[0], collisions: head[1], sides: [...head.slice(2)], place: pairs(0), velocity: pairs(1) };
+  const frame = { time: head[0], collisions: head[1], sides: [...head.slice(2, 6)], open: [0, 1, 2, 3].map(k => head[6] >> k & 1), place: pairs(0), velocity: pairs(1) };
   if (film.turning) frame.angle = new Float32Array(buffer, 8 * HEAD + 16 * disks, disks);
   if (film.recycling) frame.recycled = new Float32Array(buffer, 8 * HEAD + (film.turning ? 20 : 16) * disks, disks);
   // The interval between two frames is so short that no disk moves farther than half of the box.
@@ -195,7 +202,7 @@ const fromWorker = {
 // ---------- film as a part of the laboratory ----------
 
 // These functions are called by the laboratory for each of its films.
-function inside() { return { film, source, state, moment, kinds, stream, overlaid, past, numbersNow, speedsOfFilm }; }
+function inside() { return { film, source, state, moment, kinds, stream, overlaid, past, encounter, numbersNow, speedsOfFilm }; }
 
 // Converts a position in the box to a position on the page [CSS pixels].
 function pixelOf(x, y) { return [across(x) / page.dots, up(y) / page.dots]; }
@@ -246,10 +253,11 @@ function choices(wish) {
     if (wish.pace) [pace, usual] = [wish.pace, false];
     $('pace').value = wish.speed;
     Object.assign(state, wish.state);
+    Object.assign(encounter, wish.scale);
     if (film) refresh();
   }
-  const { colour, arrows, sofar, total } = state;
-  return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total } };
+  const { colour, arrows, sofar, total, momenta, centred } = state, { input, speed, mass } = encounter;
+  return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total, momenta, centred }, scale: { input, speed, mass } };
 }
 
 // When another run starts beside the run of this film, this film plays again from its first stored frame.

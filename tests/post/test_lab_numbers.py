@@ -27,8 +27,8 @@ def test_the_pressure_beside_a_moving_side_is_that_of_the_area_of_each_moment():
             seen = {name: float(np.sum(part)) for name, part in run._observed().items()}
             samples.append(sampled(count, seen | {"time": run.time}))
     parts = [np.array(samples[k : k + 101]).T for k in (0, 100, 200)]
-    means = [pressure_between(part, count).mean for part in parts]
-    assert pressure_between(np.array(samples).T, count).mean == pytest.approx(np.mean(means))
+    means = [pressure_between(part).mean for part in parts]
+    assert pressure_between(np.array(samples).T).mean == pytest.approx(np.mean(means))
 
 
 THEORIES = {  # systems in equilibrium, and the number of their theoretical values

@@ -13,9 +13,11 @@ import aiohttp
 import pytest
 from aiohttp import web
 
+import lab as script
 from laboratory import film, laboratory
 from ricochet import RunError, live
 from ricochet import lab as module
+from sampling import STATISTICS
 from synthetic_run import ROOT, run_script
 from whole_runs import PATIENCE, ran, wait_for
 
@@ -39,15 +41,27 @@ def test_no_file_is_read_by_another_door(address):
     asyncio.run(visit())
 
 
-def test_runs_have_their_number(address):
+#: A worker that sends one message as soon as it starts.
+SCENE = """printf 't\\000\\000\\000\\017{"is": "scene"}'; exec cat"""
+
+
+def test_runs_have_their_number(program, monkeypatch):
+    """The server counts connections, so that trivial workers suffice."""
+    monkeypatch.setenv("RICOCHET", str(program))
+    lab = module.Lab([], [], ["sh", "-c", SCENE])
+
     async def visit():
-        async with AsyncExitStack() as open_films:
+        async with (
+            live.serving(live.application({"/ws": lab.socket}), 0) as (address, _),
+            AsyncExitStack() as open_films,
+        ):
             for _ in range(module.RUNS):
                 one = await open_films.enter_async_context(film(address))
             with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
                 await open_films.enter_async_context(film(address))
             assert refused.value.status == 409
-            await one.start()
+            await one.until("scene")
+        await lab.close()
 
     asyncio.run(visit())
 
@@ -131,14 +145,14 @@ def alive(pids):
     ("at", "signs"),
     [
         ("once", ["TERM"]),
-        ("work", ["INT"]),
-        ("work", ["HUP"]),
+        pytest.param("work", ["INT"], marks=STATISTICS),
+        pytest.param("work", ["HUP"], marks=STATISTICS),
         ("work", ["TERM", "HUP", "TERM"]),
-        ("work", ["KILL"]),
+        pytest.param("work", ["KILL"], marks=STATISTICS),
         ("placing", ["INT", "INT"]),
-        ("placing", ["KILL"]),
+        pytest.param("placing", ["KILL"], marks=STATISTICS),
         ("keeping", ["KILL"]),
-        ("keeping", ["HUP", "TERM"]),
+        pytest.param("keeping", ["HUP", "TERM"], marks=STATISTICS),
     ],
 )
 def test_nothing_is_left_behind(program, tmp_path, at, signs):
@@ -205,6 +219,36 @@ def test_wrong_words_are_refused_in_one_line(address, program, monkeypatch, caps
     ):
         assert run_script("lab", *words) == 2
         assert reason in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("is_taken", [True, False])
+def test_a_laboratory_at_another_than_its_usual_port_names_both(
+    program, monkeypatch, capsys, is_taken
+):
+    monkeypatch.setenv("RICOCHET", str(program))
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        usual = other.getsockname()[1]
+        monkeypatch.setattr(script, "USUAL_PORT", usual)
+        if not is_taken:
+            other.close()
+
+        async def printed():
+            lab = module.Lab([], [], ["cat"])
+            task, out = asyncio.create_task(script.open_lab(lab, [usual, 0], visit=False)), ""
+            async with asyncio.timeout(PATIENCE):
+                while not out:
+                    await asyncio.sleep(0.01)
+                    out = capsys.readouterr().out
+            os.kill(os.getpid(), signal.SIGTERM)
+            await task
+            return out.splitlines()
+
+        first, *rest = asyncio.run(printed())
+    address = first.removesuffix("  (Ctrl-C ends)")
+    assert (address == f"http://127.0.0.1:{usual}/") != is_taken
+    assert len(rest) == is_taken
+    for line in rest:
+        assert line.startswith(f"Port {usual} is in use") and line.endswith(address)
 
 
 def test_a_port_that_is_taken_is_replaced_by_the_next_of_the_list():

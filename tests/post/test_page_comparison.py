@@ -1,12 +1,15 @@
 """The page of the laboratory: kept runs beside the next run, in equal boxes and at equal times."""
 
+import numpy as np
 import pytest
 
 from laboratory_page import inside, moving, slide, type_at
+from sampling import mostly
 from whole_runs import wait_for
 
 
 def test_kept_runs_stand_beside_the_next_in_equal_boxes_and_plots(opened):
+    """This takes 5 s, because several runs move and are drawn at the same time."""
     opened.press("c")
     moving(opened, 1)
     slide(opened, 0, 0.7)
@@ -20,7 +23,7 @@ def test_kept_runs_stand_beside_the_next_in_equal_boxes_and_plots(opened):
     assert opened.run("return state.boxes.map(box => box.letter)") == ["A", "B"]
     wait_for(lambda: len(inside(opened, "overlaid")) == 1)
     opened.press("p")
-    wait_for(lambda: opened.run("return films().every(one => !one.inside().state.playing)"))
+    opened.until("return films().every(one => !one.inside().state.playing)")
     opened.run("remove(state.boxes[0])")
     assert opened.run("return state.boxes.map(box => box.letter)") == ["B"]
 
@@ -34,21 +37,25 @@ TIMES = "return films().map(one => one.inside().moment.shown)"
 
 
 def test_compared_runs_show_one_time_and_go_on_alone(opened):
-    """This holds while they play, at each step, and when a paused film goes to another time."""
+    """This holds while they play, at each step, and when a paused film goes to another time.
+
+    This takes 5 to 10 s, because three runs move and are drawn at the same time.
+    """
     wait_for(lambda: inside(opened, "moment.time") > 0.1)
     for kept in (1, 2):
         opened.press("c")
         moving(opened, kept)
     opened.run("set('species.gas.count', '3000')")
     moving(opened, 3)
+    stored = opened.run("return Math.max(...films().map(one => one.inside().past.at(-1).time))")
     seen = set()
     while len(seen) < 20 or min(seen) == max(seen):
         times = opened.run(TIMES)
         assert len(times) == 3 and min(times) == max(times)
         seen.add(times[0])
-    wait_for(lambda: opened.run(TIMES)[0] > 0.15)  # beyond the kept frames
+    wait_for(lambda: opened.run(TIMES)[0] > stored)  # then all films have equal frames
     opened.press("p")
-    wait_for(lambda: opened.run("return films().every(one => !one.inside().state.playing)"))
+    opened.until("return films().every(one => !one.inside().state.playing)")
     for key in ("\ue012", "\ue011", "\ue014", "\ue010", "\ue014", "n", "n", "\ue012"):
         before = opened.run(TIMES)[0]
         opened.press(key)  # left, Home, right, End, ...
@@ -81,7 +88,7 @@ def test_a_run_beside_a_kept_run_starts_whatever_is_changed_meanwhile(opened, ca
     """Each request starts one run; the last run has the newest possible values, and moves."""
     script, settings, number = WHILE_LOADING[case]
     opened.run(f"const key = 'species.gas.speed'; {script}")
-    wait_for(lambda: opened.run("return !busy && !again && current().run === state.runs"))
+    opened.until("return !busy && !again && current().run === state.runs")
     moving(opened, number - 1)
     assert opened.run("return [state.has, state.runs]") == [settings, number]
     reached = inside(opened, "moment.time")
@@ -126,9 +133,12 @@ LESSON = {
 }
 
 
-@pytest.mark.parametrize("name", LESSON)
+@pytest.mark.parametrize("name", mostly(LESSON, ["crater"]))
 def test_a_value_typed_beside_a_kept_run_starts_both_from_their_start(opened, name):
-    """Shortcuts act after Enter, and no worker is asked for the time of the previous run."""
+    """Shortcuts act after Enter, and no worker is asked for the time of the previous run.
+
+    This takes 5 to 10 s, because three runs move and are drawn at the same time.
+    """
     before = opened.run("return current().run")
     opened.run("choose(arguments[0])", name)
     moving(opened, before)
@@ -178,6 +188,34 @@ def test_compared_runs_have_numbers_and_histograms_side_by_side(opened):
     assert own == [["A", 1000]]
 
 
+#: Records the largest values of the axes of the histogram of speeds, and the runs with a curve.
+RECORDED = """const film = filmOf(current()), { axes, drawMaxwell } = film;
+    film.recorded = {};
+    film.axes = (plot, x, y, name, ...rest) => {
+      if (name === 'speed') film.recorded = { most: [x[1], y[1]], curves: [] };
+      return axes(plot, x, y, name, ...rest);
+    };
+    film.drawMaxwell = (pen, one, ...rest) => {
+      film.recorded.curves.push(one.letter ?? 'own');
+      drawMaxwell(pen, one, ...rest);
+    };"""
+
+
+@pytest.mark.parametrize("speed", [0.5, 2])
+def test_the_histogram_has_room_and_a_curve_for_each_compared_run(opened, speed):
+    """The maximum of Maxwell's distribution of speeds is at most e^(-1/2) sqrt(m/E)."""
+    opened.press("c")
+    moving(opened, 1)
+    opened.run(f"set('species.gas.speed', '{speed}'); {RECORDED}")
+    moving(opened, 2)
+    seen = "return filmOf(current()).recorded"
+    wait_for(lambda: sorted(opened.run(seen).get("curves", [])) == ["A", "own"])
+    width, height = opened.run(seen)["most"]
+    for one in (1, speed):
+        assert height > np.exp(-0.5) * np.sqrt(2) / one
+        assert width > 2 * one
+
+
 def test_another_input_removes_the_kept_runs_and_the_same_input_keeps_them(opened):
     """Plots never contain curves of different inputs."""
     opened.press("c")
@@ -204,7 +242,7 @@ def test_a_scan_beside_a_kept_run_is_seen_and_moves_nothing(opened):
     before = opened.run(places)
     opened.run("$('scanning').open = true")
     opened.click("scan")
-    wait_for(lambda: opened.run("return scan.points.length"))
+    opened.until("return scan.points.length")
     for _ in range(2):
         seen = """const canvas = $('curve'), box = canvas.getBoundingClientRect();
             const { left, top, right, bottom } = box;
@@ -216,3 +254,28 @@ def test_a_scan_beside_a_kept_run_is_seen_and_moves_nothing(opened):
         assert opened.run(drawn)
         assert opened.run(places) == before
         wait_for(lambda: opened.run("return scan.points.length") == 5)
+
+
+STAGES = """return state.boxes.map(box => box.frame.getBoundingClientRect().y
+      + filmOf(box).document.getElementById('stage').getBoundingClientRect().y);"""
+AT_HISTOGRAM = """const film = filmOf(current()), frame = current().frame;
+    const plot = film.document.getElementById('histogram').getBoundingClientRect();
+    const top = frame.getBoundingClientRect().y, at = top + plot.y + plot.height / 2;
+    return [at > top && document.elementFromPoint(plot.x + plot.width / 5, at) === frame,
+      ['first', 'last'].map(id => film.document.getElementById(id).offsetWidth > 0)].flat();"""
+
+
+def test_compared_pictures_are_scrolled_together_on_a_telephone(opened):
+    """No picture covers a plot, and the buttons to both ends of the film are there."""
+    opened.press("c")
+    moving(opened, 1)
+    opened.press("p")
+    opened.resize(390, 844, True)
+    opened.until("return filmOf(current()).document.getElementById('histogram').offsetWidth > 300")
+    before = opened.run(STAGES)
+    assert before[0] == pytest.approx(before[1], abs=1)
+    opened.run("filmOf(current()).scrollTo(0, 250)")
+    wait_for(lambda: opened.run(STAGES)[0] < before[0] - 200)
+    after = opened.run(STAGES)
+    assert after[0] == pytest.approx(after[1], abs=1)
+    assert opened.run(AT_HISTOGRAM) == [True] * 3

@@ -4,7 +4,9 @@ import re
 from decimal import Decimal
 from itertools import pairwise
 
-import player
+import pytest
+
+from ricochet.figures.film import whole
 from laboratory_page import CHOOSER, inside, moving
 from whole_runs import wait_for
 
@@ -13,7 +15,7 @@ def test_disks_can_be_told_from_both_grounds_and_species_in_grey(simulated, brow
     """The contrast is at least 3 to 1, as required by WCAG 2.2 for graphics (1.4.11)."""
     species = "".join(f"&species count = 3 radius = 0.0{k} speed = 1 /\n" for k in (1, 2, 3, 4))
     run = simulated(species + "&stop time = 1 /\n")
-    (tmp_path / "film.html").write_text(player.whole(run))
+    (tmp_path / "film.html").write_text(whole(run))
     browser.open(tmp_path / "film.html")
     for dark in (False, True):
         ground, disks, scale = browser.run(
@@ -44,6 +46,12 @@ def test_the_first_key_leads_to_the_film_and_larger_text_stays_in_its_card(opene
         const wide = part => part.getBoundingClientRect().right > end
           || part.scrollWidth > part.clientWidth + 1;
         return [...card.querySelectorAll('.row, label, output')].filter(wide).map(one => one.id)"""
+    opened.resize(1024, 768)
+    cut = "return [...$('bar').children].filter(one => one.scrollHeight > one.clientHeight + 1)"
+    longest = max((one["title"] for one in CHOOSER.values()), key=len)
+    opened.run("$('name').textContent = arguments[0]", longest)
+    assert opened.run(f"{cut}.map(one => one.id)") == []
+    opened.resize(1920, 1080)
     for speed in (-2, 1.5):
         opened.run(
             """const film = filmOf(current()), pace = film.document.getElementById('pace');
@@ -53,15 +61,23 @@ def test_the_first_key_leads_to_the_film_and_larger_text_stays_in_its_card(opene
         assert opened.run(beyond) == []
 
 
-def test_every_title_fits_into_a_telephone_and_the_controls_are_seen(opened):
-    opened.resize(360, 740, True)
+@pytest.fixture
+def paused(opened):
+    """Return the laboratory with a film that stands still, and need not be drawn all the time."""
+    opened.run("filmOf(current()).play(false)")
+    opened.until("return !filmOf(current()).inside().state.playing")
+    return opened
+
+
+def test_every_title_fits_into_a_telephone_and_the_controls_are_seen(paused):
+    paused.resize(360, 740, True)
     for one in CHOOSER.values():
-        opened.run("$('name').textContent = arguments[0]", one["title"])
-        wide = opened.run("return [document.documentElement.scrollWidth, innerWidth]")
+        paused.run("$('name').textContent = arguments[0]", one["title"])
+        wide = paused.run("return [document.documentElement.scrollWidth, innerWidth]")
         assert wide == [360, 360], one["title"]
     ends = """const play = filmOf(current()).document.getElementById('play');
         return [play.getBoundingClientRect().bottom, current().frame.clientHeight]"""
-    wait_for(lambda: opened.run(f"{ends}.reduce((play, frame) => play <= frame)"))
+    paused.until(f"{ends}.reduce((play, frame) => play <= frame)")
 
 
 #: Sizes of windows, of which some are so narrow that the sliders are hidden at first.
@@ -102,27 +118,27 @@ PLACES = """const box = leader(), { x, y } = box.frame.getBoundingClientRect();
       bar: $('bar').getBoundingClientRect().bottom };"""
 
 
-def test_nothing_is_cut_in_windows_of_all_sizes(opened):
+def test_nothing_is_cut_in_windows_of_all_sizes(paused):
     """Scroll bars have their usual width, and numbers are as long as they can be."""
     for width, height in SIZES:
-        opened.resize(width, height)
+        paused.resize(width, height)
         is_narrow, is_phone = width < 1100, width < 700
-        wait_for(lambda hides=is_narrow: opened.run("return isBare()") == hides)
+        wait_for(lambda hides=is_narrow: paused.run("return isBare()") == hides)
         for is_open in (False, True) if is_narrow else (True,):
             if is_narrow and is_open:
-                opened.click("settings")
-            opened.run(SHOW_ROWS, ROWS)
+                paused.click("settings")
+            paused.run(SHOW_ROWS, ROWS)
             case = width, height, is_open
-            assert opened.run(WIDE) == [], case
-            places = opened.run(PLACES)
+            assert paused.run(WIDE) == [], case
+            places = paused.run(PLACES)
             left, top, _, bottom = places["stage"]
             assert bottom - top > 0.45 * min(height, width if is_phone else 0.8 * width), case
             assert not is_phone or top < places["bar"] + 20, "the film is first"
             assert left >= places["form"][2] or bottom <= places["form"][1] or not is_open, case
         if is_narrow:
-            opened.click("settings")
+            paused.click("settings")
     texts = "[...filmOf(leader()).document.querySelectorAll('#numbers td')]"
-    texts = opened.run(f"return {texts}.map(one => one.textContent)")
+    texts = paused.run(f"return {texts}.map(one => one.textContent)")
     assert {"0.4996900 ±\u00a00.0000019", "0.5000000", "553.87 ±\u00a00.89"} <= {*texts}
 
 
@@ -166,7 +182,7 @@ def test_a_kept_run_shows_its_film_and_plots_until_the_next_one_does(opened):
     wait_for(lambda: inside(opened, "numbersNow().length"))
     opened.run("start = run; run = () => {}; keep()")  # the next run does not start yet
     for state in ("true", "isThere(current())"):
-        wait_for(lambda what=state: opened.run(f"return {what}"))
+        opened.until(f"return {state}")
         waiting = opened.run(f"arrangeAll(); {COMPARED}")
         assert waiting["leads"] and waiting["plots"]
         left, right, width = waiting["advice"]
@@ -177,10 +193,10 @@ def test_a_kept_run_shows_its_film_and_plots_until_the_next_one_does(opened):
     compared = opened.run(COMPARED)
     assert not compared["leads"] and compared["advice"][2] == 0
     assert compared["captions"] == ["A: as in the file", "B: change a slider"]
-    for width, height in SIZES:
-        opened.resize(width, height)
+    for size in [*SIZES, (390, 844, True)]:  # scroll bars of a telephone take no space
+        opened.resize(*size)
         opened.run(SHOW_ROWS, ROWS)
-        assert opened.run(WIDE) == [], (width, height)
+        assert opened.run(WIDE) == [], size
     opened.resize(1280, 800)
     opened.run("set('species.gas.speed', '2')")
     caption = "return current().figure.firstChild.textContent"

@@ -3,6 +3,7 @@
 import pytest
 
 from laboratory_page import inside, moving, pixel
+from sampling import mostly
 from whole_runs import wait_for
 
 SIZES = {"tablet": (1024, 768), "telephone": (390, 844)}
@@ -21,7 +22,7 @@ SLIDER = """const one = document.querySelectorAll('.slider [type=range]')[argume
     return [box.x, box.y + box.height / 2, box.width, +one.value];"""
 
 
-@pytest.fixture(params=SIZES)
+@pytest.fixture(params=mostly(SIZES, ["telephone"]))
 def touched(opened, request):
     """Return the laboratory on a screen with fingers when five large disks move."""
     opened.resize(*SIZES[request.param], True)
@@ -67,6 +68,7 @@ def place_of(browser, disk):
 
 
 def test_a_finger_drags_each_side_and_scrolls_nothing(touched):
+    """This takes 5 to 15 s, because the browser draws the moving disks during long gestures."""
     sides = {"right": 1, "top": 3, "bottom": 2, "left": 0}
     for name, number in sides.items():
         x0, x1, y0, y1 = inside(touched, "past.at(-1).sides")
@@ -84,16 +86,19 @@ def test_a_finger_drags_each_side_and_scrolls_nothing(touched):
 
 
 def test_a_finger_elsewhere_scrolls_the_page_and_changes_nothing(touched):
-    """Also along a side and, while the run is paused, on a disk that was not selected."""
+    """Also along a side and, while the run is paused, on a disk that was not selected.
+
+    This takes 5 to 10 s, because the browser draws the moving disks during long gestures.
+    """
     starts = [pixel(touched, 0.5, 0.4), pixel(touched, 0.005, 0.4)]
     for start in starts:
         touched.touch(*path(start, [start[0], start[1] - 70]))
-        wait_for(lambda: touched.run("return filmOf(current()).scrollY"))
+        touched.until("return filmOf(current()).scrollY")
         to_the_top(touched)
     paused(touched)
     start = pixel(touched, *place_of(touched, 0))
     touched.touch(*path(start, [start[0], start[1] - 70]))
-    wait_for(lambda: touched.run("return filmOf(current()).scrollY"))
+    touched.until("return filmOf(current()).scrollY")
     assert touched.run("return [heard.pointercancel, heard.pointerup ?? 0]") == [3, 0]
     assert changes(touched) == []
     assert inside(touched, "state.traced") == []
@@ -138,13 +143,14 @@ def test_a_refused_position_is_told_until_the_next_change(touched):
 
 
 def test_a_finger_that_scrolls_over_a_slider_leaves_its_value(touched):
+    """This takes 5 to 15 s, because the browser draws the moving disks during long gestures."""
     run = touched.run("return current().run")
     touched.press("s")
     x, y, width, value = touched.run(SLIDER, 3)
     for fraction in (0.2, 0.7):
         start = [x + fraction * width, y]
         touched.touch(*path(start, [start[0], start[1] - 120]))
-        wait_for(lambda: touched.run("return $('form').scrollTop"))
+        touched.until("return $('form').scrollTop")
         assert touched.run(SLIDER, 3)[3] == value
         to_the_top(touched)
     assert changes(touched) == [] and touched.run("return current().run") == run
@@ -164,7 +170,7 @@ def test_a_finger_sets_the_speed_and_the_time_of_a_film_only_along_their_sliders
         x, y, _ = touched.run(IN_FILM, name)
         before = touched.run(value)
         touched.touch(*path([x - 20, y], [x - 20, y - 100]))
-        wait_for(lambda: touched.run("return filmOf(current()).scrollY"))
+        touched.until("return filmOf(current()).scrollY")
         assert inside(touched, "state.playing")
         assert name == "scrub" or touched.run(value) == before
         to_the_top(touched)

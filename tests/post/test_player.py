@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import player
-from ricochet import read_run
+from ricochet import film_data, read_run
 from ricochet.figures.drawing import draw_box, plt
 from ricochet.reading.reader import SIDES
 from synthetic_run import maxwell_velocities, still_run, write_run, written
@@ -23,7 +23,8 @@ def bouncing_gas(path, rng, frames=40, count=60, **more):
     kinds = {"mass": np.where(heavy, 4.0, 1.0), "radius": np.where(heavy, 0.02, 0.01)}
     kinds |= {"species": 1 + heavy, "names": ("light", "heavy")}
     kinds["collisions"] = np.arange(frames)[:, None] * np.arange(count)
-    kinds["observables"] = {"collisions": 30 * np.arange(frames)}
+    energies = {f"{name}/kinetic_energy": np.ones(frames) for name in kinds["names"]}
+    kinds["observables"] = {"collisions": 30 * np.arange(frames), **energies}
     kinds["parameters"] = {"run": {"title": "A <gas> & more", "seed": 3}}
     return write_run(path, position, velocity, **kinds | more)
 
@@ -43,14 +44,14 @@ def test_speeds_energies_and_pressure_are_those_of_the_run(tmp_path, rng):
         assert (curves["pressure"] is None) == (count == 2), "too few samples"
         if curves["pressure"]:
             assert curves["pressure"][0] is None, "before the first collision"
-            assert len(curves["time"]) == min(count, player.MOST_SAMPLES)
+            assert len(curves["time"]) == min(count, film_data.MOST_SAMPLES)
             shown = np.array(curves["pressure"][1:]), curves["time"][1:]
             expected = np.interp(shown[1], range(count), pressure[:count])
             np.testing.assert_allclose(shown[0], expected, rtol=1e-6)
     assert curves["potential"] is None
 
 
-COUNTED = "state.sofar = arguments[0]; go(arguments[1]); const { counts, samples } = speedsNow();"
+COUNTED = "state.sofar = arguments[0]; go(arguments[1]); const { counts, seen } = speedsNow();"
 
 
 def test_speeds_are_counted_at_the_moment_and_so_far(playing, tmp_path, rng):
@@ -58,9 +59,9 @@ def test_speeds_are_counted_at_the_moment_and_so_far(playing, tmp_path, rng):
     browser = playing(run.path)
     edges = browser.run("return film.speeds.edges")
     for sofar, frames in ((False, [12]), (True, range(13))):
-        told = "return [counts.map(c => Array.from(c)), samples]"
-        counts, samples = browser.run(COUNTED + told, sofar, run.time[12])
-        assert samples == len(frames)
+        told = "return [counts.map(c => Array.from(c)), seen]"
+        counts, seen = browser.run(COUNTED + told, sofar, run.time[12])
+        assert seen == [len(frames) * kind.disks.sum() for kind in run.by_species]
         for s, kind in enumerate(run.by_species):
             true = np.histogram(run.speed(list(frames))[:, kind.disks], edges)[0]
             apart = np.abs(np.subtract(counts[s][: len(true)], true))
@@ -540,14 +541,21 @@ SIZES = {
 CONTROLS = ["stage", "play", "scrub", "pace", "colour", "arrows", "full", "follow", "clear"]
 
 
-@pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("edges", [(1, 1), (1, 3), (3, 1)])
-def test_box_and_controls_are_seen_without_scrolling(browser, playing, tmp_path, size, edges):
+def test_box_and_controls_are_seen_without_scrolling(browser, playing, tmp_path, edges):
     position = np.full((3, 12, 2), 0.5) * edges
-    width, height, phone = SIZES[size]
-    browser.resize(width, height, phone)
     playing(still_run(tmp_path / "a.h5", position, edges=edges))
-    browser.run("go(1); trace([3])")
+    for size in SIZES:
+        browser.resize(*SIZES[size])
+        browser.open(tmp_path / "film.html")
+        browser.run("go(1); trace([3])")
+        controls_are_seen(browser, size, edges)
+    assert browser.complaints() == []
+
+
+def controls_are_seen(browser, size, edges):
+    """Test the places of the controls of a film in a window of one of the `SIZES`."""
+    width, height, phone = SIZES[size]
     assert browser.run("return document.documentElement.scrollWidth") <= width
     boxes = {
         name: browser.run("return $(arguments[0]).getBoundingClientRect().toJSON()", name)
@@ -564,4 +572,3 @@ def test_box_and_controls_are_seen_without_scrolling(browser, playing, tmp_path,
         assert boxes["histogram"]["bottom"] < height and boxes["histogram"]["height"] > 70
     if size == "wide":
         assert boxes["energy"]["right"] > 1860 and boxes["energy"]["bottom"] < 1080
-    assert browser.complaints() == []

@@ -2,7 +2,7 @@
 
 import pytest
 
-import player
+from ricochet import film_data
 
 
 def test_obstacles_and_walls_have_their_names(simulated):
@@ -14,7 +14,7 @@ def test_obstacles_and_walls_have_their_names(simulated):
         &species count = 2 radius = 0.01 speed = 1 / &stop events = 5 /"""
     )
     names = ["obstacle 1", "obstacle post", "wall roof", "wall roof", "wall 2"]
-    assert player.scene(run)[0]["surfaces"][4:] == names
+    assert film_data.scene(run)[0]["surfaces"][4:] == names
 
 
 TRACERS = """&species count = 30 radius = 1e-8 speed = 1 / &stop time = 1 /
@@ -45,4 +45,5 @@ def test_recycled_disks_jump_and_no_event_log_would_help(simulated):
     drive = "&drive kind = 'recycle' interval = 0.1 from_region = 0, 1, 0, 0.2 "
     drive += "to_region = 0, 1, 0.5, 1 velocity = 0, -1 /"
     run = simulated(TRACERS + drive)
-    assert player.film(run, [0, 1], "speed", [])[0]["note"] == "recycled disks jump between frames"
+    facts, _ = film_data.film(run, [0, 1], "speed", [])
+    assert facts["note"] == "recycled disks jump between frames"

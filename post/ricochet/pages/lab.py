@@ -1,9 +1,8 @@
 """Web server of the laboratory, which starts a worker process for each simulation of a page.
 
-Each run and each scan of a page has its own WebSocket and its own worker process
-(`ricochet.worker`).  The worker process ends when the WebSocket is closed.  A spare worker process
-is always ready, because the start of Python takes noticeable time.  If the server is killed, the
-operating system ends all worker processes.
+Each run and each scan has its own WebSocket and worker process (`ricochet.worker`), which ends when
+the socket is closed. A spare worker is always ready, because Python takes time to start. If the
+server is killed, the operating system ends all workers.
 """
 
 import asyncio
@@ -171,9 +170,9 @@ class Lab:
         await socket.close(message=ENDED if self.closed else DIED)
 
     def allowed(self, query: dict) -> dict:
-        """Check a request of a page, and return the request together with the input text.
+        """Check a request of a page, and return it together with the input text.
 
-        The method raises LookupError, TypeError or ValueError if the request is malformed.
+        LookupError, TypeError or ValueError is raised if it is malformed.
         """
         if query["do"] not in ("start", "scan"):
             return query
@@ -207,20 +206,13 @@ async def send(socket: web.WebSocketResponse, message: dict) -> None:
 
 
 def terminate(worker: Process) -> None:
-    """Ask a worker process to end.
-
-    A worker that is writing a temporary file removes this file before it ends.
-    """
+    """Ask a worker process to end, after it has removed any temporary file."""
     with suppress(ProcessLookupError):
         worker.terminate()
 
 
 def is_alive(worker: Process) -> bool:
-    """Return whether a worker process is still running.
-
-    The return code alone is not reliable, because `asyncio` sets it with a delay after the process
-    has ended.
-    """
+    """Return whether a worker is running; `asyncio` sets its return code with a delay."""
     with suppress(ProcessLookupError):
         os.kill(worker.pid, 0)
         return worker.returncode is None

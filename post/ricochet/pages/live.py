@@ -1,7 +1,7 @@
 """Web server for browsers on the same computer, and the page that shows an unfinished run.
 
-The server refuses requests from pages of other web sites.  Without this refusal, pages of other web
-sites might read data through a host name that is resolved to this computer (DNS rebinding).
+Requests from pages of other web sites are refused; they might read data through a host name that is
+resolved to this computer (DNS rebinding).
 """
 
 import asyncio
@@ -60,9 +60,9 @@ async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse
 
 
 def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Application:
-    """Return a web application that answers each request by the function for the requested path.
+    """Return a web application with a function for each path.
 
-    `frames` lists the origins of web pages that may embed pages of this server in an HTML frame.
+    `frames` lists the origins of web pages that may embed its pages in an HTML frame.
     """
     app = web.Application(middlewares=[guarded], client_max_size=LONGEST)
     app[SERVER] = {"heard": set()}  # connections that have sent a request
@@ -105,8 +105,7 @@ async def listen(runner: web.AppRunner, ports: Sequence[int]) -> None:
 async def serving(app: web.Application, *ports: int):
     """Run the server; yield its address and an event that Ctrl-C, TERM and HUP set.
 
-    The server uses the first free port of `ports`; port 0 stands for any free port.  The function
-    raises RunError if other programs use all these ports.
+    It uses the first free port of `ports`, of which 0 is any; RunError is raised if none is free.
     """
     for name in ("aiohttp", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # requests are not logged
@@ -140,10 +139,9 @@ def page_of(text: str) -> Callable:
 
 
 class Live:
-    """Film of a run that may still be in progress.
+    """Film of a run that may still be in progress, and is not disturbed.
 
-    Requests do not disturb the running simulation, because the output file is opened without a lock
-    for each request, and only completely written data are read.
+    For each request the output file is opened without a lock, and only complete data are read.
     """
 
     def __init__(self, run: Run, make_film: Callable[[Run], dict]) -> None:
@@ -193,11 +191,9 @@ class Live:
 
 
 def abandoned(lock: Path) -> bool:
-    """Return whether the simulation program was killed.
+    """Return whether the program was killed, so that no process holds a lock on its lock file.
 
-    A killed program leaves a lock file on which no process holds a lock.  To test the lock of a
-    file, the function acquires and releases the lock.  If the file system does not support locks,
-    the function returns False.
+    Without locks in the file system, the result is False.
     """
     import fcntl  # imported here because it does not exist on Windows, where files can be read
 
@@ -220,11 +216,10 @@ def serve(
     make_film: Callable[[Run], dict],
     open_page: Callable[[str], object] | None = None,
 ) -> str:
-    """Show a run until it ends or a signal arrives, and return why the server stopped.
+    """Show a run until it ends or Ctrl-C or TERM arrives, and return why the server stopped.
 
-    The server stops when the run has ended, or after Ctrl-C or the signal TERM.  When the page is
-    available, the function calls `open_page` with the address of the page.  The function raises
-    RunError if the file cannot be shown, or if the simulation program was killed.
+    `open_page` is called with the address of the page. RunError is raised if the file cannot be
+    shown, or if the simulation program was killed.
     """
     if run.path.suffix != ".part":
         raise RunError(f"{run.path}: has finished; leave out --live")

@@ -13,6 +13,7 @@ from ..analysis.statistics import SeriesMean, correlated_mean, equilibration
 from ..predictions.walls import virial_pressure
 from ..reading.nature import Nature, bath_temperatures
 from ..reading.reader import Run, Series, obstacles_of, walls_of
+from ..reading.records import Change
 from ..running.simulation import Simulation
 
 FEW_DISKS = 20  # largest number of disks whose next events are sent
@@ -31,6 +32,11 @@ class SnapshotRun(Run):
     def observable(self, name: str) -> Series:
         value = np.asarray(self.simulation.observable(name))
         return Series(np.array([self.simulation.time]), value[None])
+
+    @property
+    def changes(self) -> list[Change]:
+        """No changes, because the parameters describe the present state."""
+        return []
 
     piston_positions = property(Run.piston_positions.func)  # not cached, because pistons move
 
@@ -55,6 +61,8 @@ def snapshot_run(simulation: Simulation) -> SnapshotRun:
     elements = {}
     if "all/rotational_energy" in simulation.observables:
         elements[TURNS] = simulation.angular_velocity[None]
+    if "inside" in simulation.observables:
+        elements["present"] = simulation.present[None]
     return SnapshotRun(
         simulation=simulation,
         path=Path(parameters.get("run", {}).get("title") or "simulation"),
@@ -88,17 +96,18 @@ def observed(simulation: Simulation) -> dict[str, float]:
 def sampled(count: int, value: dict) -> tuple[float, ...]:
     """Return the quantities from which means are computed: time, energy, virial, area.
 
-    The observable `virial_pressure` follows from the time, the energy, the virial and the area.
+    The energy is that of all `count` disks or, in an open system, of the disks inside.
     """
-    time, kinetic, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
-    whole = count * kinetic + (virial / (2 * time) if time else 0.0)
+    time, mean, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
+    kinetic = mean * inside if (inside := value.get("inside", count)) else 0.0
+    whole = kinetic + (virial / (2 * time) if time else 0.0)
     return time, kinetic, virial, whole / (value["virial_pressure"] or 1.0)
 
 
-def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
+def pressure_between(samples: np.ndarray) -> SeriesMean:
     """Return the mean pressure between the first and the last sample; the sides may move."""
     (kinetic, virial, area), apart = samples[1:4], np.diff(samples[0])
-    gain = count * kinetic[1:] * apart + np.diff(virial) / 2
+    gain = kinetic[1:] * apart + np.diff(virial) / 2
     return correlated_mean(gain / area[1:], apart)
 
 
@@ -111,10 +120,9 @@ def sample_of(run: Run, value: dict) -> tuple[float, ...]:
 def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list[dict]:
     """Return mean, error and theory of the temperature, the mean speeds and the pressure.
 
-    The means are over the samples in equilibrium, and their errors include the autocorrelation.
-    Means are omitted if the run does not relax to equilibrium, or has too few samples so far;
-    theoretical values are omitted if no theory is known.  The argument `energy` is the present
-    energy of all disks.
+    The means over samples in equilibrium have errors with autocorrelation. They are omitted if the
+    run does not relax, or has too few samples so far, as theories are where none is known. `energy`
+    is the present energy of all disks.
     """
     titles = ["temperature"]
     titles += [f"mean speed of {name}" for name in run.names] if run.names[1:] else ["mean speed"]
@@ -124,7 +132,7 @@ def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list
         first = max(map(equilibration, columns[KEPT:]))
         if len(samples) - first > FEWEST // 2:
             late = columns[:, first:]
-            found = [*map(correlated_mean, late[KEPT:]), pressure_between(late, run.n_disks)]
+            found = [*map(correlated_mean, late[KEPT:]), pressure_between(late)]
     expected = theory(run, energy, found[0].mean if found[0] else None)
     return [
         {
@@ -145,8 +153,8 @@ def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list
 def theory(run: Run, energy: float, measured: float | None) -> list[float | None]:
     """Return theoretical values of the quantities of `means` and of the pressure of an ideal gas.
 
-    The observable `temperature` of n disks is kT (1 - 1/n), because it excludes the mean motion.
-    If no theory predicts kT, the other theoretical values follow from the measured temperature.
+    The observable `temperature` of n disks is kT (1 - 1/n), because it excludes the mean motion. If
+    no theory predicts kT, the other values follow from the measured temperature.
     """
     count, alike = run.n_disks, [kind.alike for kind in run.by_species]
     law: list[float | None] = [None] * (len(alike) + 3)

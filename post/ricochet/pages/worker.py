@@ -1,19 +1,17 @@
 """Worker process of the laboratory, which simulates and sends frames to a web page.
 
-The worker process reads requests from standard input; each request is one line of JSON.  Each
-answer on standard output begins with a letter and with its length in four bytes.  An answer with
-the letter b is a frame, and an answer with the letter t is a JSON object.  The element "is" of each
-JSON object names the kind of the answer: "scene" (the constant part of the picture), "numbers",
-"events" (the next events), "state", "problems", "file" or "scan".  The page confirms with the
-request "got" that it has drawn a frame.  The worker process waits while two frames are unconfirmed.
+A request on standard input is a line of JSON. An answer on standard output begins with a letter and
+its length in four bytes: b for a frame, t for a JSON object, whose "is" is "scene" (the constant
+part of the picture), "numbers", "events" (the next ones), "state", "problems", "file" or "scan".
+The worker waits while two frames are not confirmed by the request "got".
 
-A frame consists of binary numbers in the byte order of the computer.  The first six numbers of a
-frame have 8 bytes each, and are the time, the number of collisions per disk, and the positions of
-the left, right, bottom and top side.  All other numbers of a frame have 4 bytes each, and are the
-positions x, y of all disks, their velocities, and the angles of rotating disks.
+A frame begins with seven numbers of 8 bytes: time, collisions per disk, positions of the left,
+right, bottom and top side, and the sum of 1, 2, 4, 8 over those of these sides that are open.
+Numbers of 4 bytes follow: positions x, y of all disks, velocities, and angles of rotating disks, in
+the byte order of the computer. They are NaN for disks outside of the box.
 
-Changes are applied only at times at which no event is partly processed.  Therefore the Python
-script that the function `script` returns can repeat the run bit for bit.
+Changes are applied only at times at which no event is partly processed, so that the Python script
+of the function `script` can repeat the run bit for bit.
 """
 
 import base64
@@ -30,14 +28,18 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ..analysis.statistics import correlated_mean
+from ..reading.box import passages
 from ..reading.reader import SIDES, Run
 from ..running.program import ProgramError, value_text
 from ..running.simulation import NEVER, Simulation
+from .actions import let_in, scale_velocities, script, set_row, typical_speed, words
+from .encounters import advance_and_record, are_recorded
 from .numbers import (
     FEW_DISKS,
     TURNS,
@@ -64,6 +66,7 @@ COUNTED = ("collisions", "dissipated_energy")  # observables that are counts sin
 #: Names of the input variables that define the motion of a side.
 MOTION = ("motion", "velocity", "start_time", "end_time", "amplitude", "period", "phase")
 MOTION += ("mass", "force")
+AT_ONCE = 1e-9  # relative time after which disks enter that the user lets in
 HOLD = 0.15  # time in which a dragged side reaches the pointer [s]
 ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
 UNREAD = bytearray()  # incomplete line at the end of the data received
@@ -84,9 +87,13 @@ class Session:
         self.actions: list[tuple] = []  # changes: time, kind, value as requested, exact value
         self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST_SAMPLES)
         self.last_event: tuple | None = None
+        self.encounters: list[dict] = []  # collisions of a few disks that the page does not have
         self.goal: tuple[float, int, int] | None = None  # end time of a step that is in progress
+        self.made = 0  # number of changes of variables when the scene was last sent
         self.held: dict[int, dict] = {}  # number of each dragged side, and its earlier motion
         self.led = False  # whether the page sets the time of each frame
+        self.open_sides = 0  # sum of 1 << k over the sides k that are open
+        self.closing: dict[str, str] | None = None  # the side that a disk keeps from being closed
 
     # --- requests ---
 
@@ -96,7 +103,7 @@ class Session:
         try:
             other = Simulation._of(request["text"], setting_lines(request["settings"]))
             if other.n_disks > DISKS:
-                raise ProgramError(f"{other.n_disks} disks; the laboratory allows {DISKS}", 2)
+                raise ProgramError(f"the laboratory allows {DISKS} disks", 2)
         except (ProgramError, ValueError) as problem:
             refuse(problem)
             return
@@ -105,22 +112,27 @@ class Session:
         self.simulation, self.request, self.initial, self.pace = other, request, other.input, pace
         self.actions, self.held, self.ended, self.reason = [], {}, False, ""
         self.playing, self.goal, self.led = bool(request["playing"]), None, False
-        self.unconfirmed = 0
+        self.unconfirmed, self.encounters, self.closing = 0, [], None
         self.send_scene(changed=False)
 
     def send_scene(self, changed: bool) -> None:
         """Send the constant part of the picture after a start or a change of the simulation."""
         run = self.run = snapshot_run(self.simulation)
         self.samples.clear()
+        self.made = len(self.simulation.changes)
+        opens = run.open_at(self.simulation.time)
+        self.open_sides = sum(1 << k for k, is_open in enumerate(opens) if is_open)
         facts, blocks = self.describe_scene(run)
         letters = {name: base64.b64encode(block).decode() for name, block in blocks.items()}
-        speed = run.speed(0)
+        speed = run.speed(0)[run.in_box(0)]
         facts |= {
-            "top": float(1.5 * np.sqrt(2 * np.mean(speed**2)) or 1.0),
-            "rest": float(np.mean(speed == 0)),
+            "top": float(1.5 * np.sqrt(2 * np.mean(speed**2)) or 1.0) if len(speed) else 1.0,
+            "rest": float(np.mean(speed == 0)) if len(speed) else 0.0,
             "turning": TURNS in run.disk_data,
             "stepped": bool(run.time_step),
         }
+        if are_recorded(run):
+            facts["masses"] = run.mass.tolist()
         scene = {"is": "scene", "changed": changed, "run": self.request.get("run")}
         send_json(scene | {"facts": facts, "blocks": letters})
         self.send_frame()
@@ -148,17 +160,26 @@ class Session:
         upwards = [0.0, typical_speed(self.simulation)]
         self.set_disk("velocity", disk, own.tolist() if own.any() else upwards)
 
-    def set_disk(self, name: str, disk: int, value: list[float]) -> None:
-        """Set the position or the velocity of one disk."""
+    def aim(self, request: dict) -> None:
+        """Set the velocity of one disk to the requested one."""
+        x, y = map(float, request["velocity"])
+        self.set_disk("velocity", int(request["disk"]), [x, y], "aim")
+
+    def set_disk(self, name: str, disk: int, value: list[float], what: str = "") -> None:
+        """Set the position or the velocity of one disk; `what` is the name of the action."""
         if not 0 <= disk < self.run.n_disks:
             raise ValueError("no such disk")
-        self.apply(name, (disk, value), lambda: set_row(self.simulation, name, disk, value))
+        if np.isnan(self.simulation.position[disk, 0]):
+            self.send_state(f"disk {disk + 1} is outside of the box")
+            return
+        change = partial(set_row, self.simulation, name, disk, value)
+        self.apply(what or name, (disk, value), change)
 
     def hold(self, request: dict) -> None:
         """Move a side to a position at constant velocity, or restore its earlier motion.
 
-        The speed of the side does not exceed the rms speed of the disks.  If the earlier motion of
-        a side is impossible from its present position, the side stays there.
+        Its speed is at most the rms speed of the disks. It stays where its earlier motion is
+        impossible.
         """
         number, target = int(request["side"]), request["to"]
         name, inwards = f"side.{SIDES[number]}.", 1 if number % 2 == 0 else -1
@@ -177,6 +198,28 @@ class Session:
         wish |= {"start_time": repr(now), "end_time": repr(now + taken)}
         self.apply("hold", rest | {name + word: value for word, value in wish.items()})
 
+    def lid(self, request: dict) -> None:
+        """Open a side, or close it as soon as no disk overlaps its line."""
+        side, is_open = SIDES[int(request["side"])], bool(request["open"])
+        wish = {f"side.{side}.open": value_text("", is_open)}
+        self.closing = None
+        if not self.apply("lid", wish, refused=is_open) and not is_open:
+            self.closing = wish
+            self.send_state(f"the {side} side is closed as soon as no disk overlaps its line")
+
+    def pump(self, request: dict) -> None:
+        """Let waiting disks enter through a source at once, at most the requested number."""
+        now, known = self.simulation._settle(), self.simulation._values()
+        then = now + AT_ONCE * (now + self.pace or 1.0)
+        burst = {"count": int(request["count"]), "interval": then, "start_time": then}
+        burst = {f"source.{request['source']}.{name}": value for name, value in burst.items()}
+        burst[f"source.{request['source']}.end_time"] = then
+        usual, before = {name: known.get(name) for name in burst}, self.simulation.present.sum()
+        done = partial(let_in, self.simulation, burst, then, usual)
+        is_done = self.apply("pump", (burst, then, usual), done)
+        if is_done and self.simulation.present.sum() <= before:
+            self.send_state("no disk waits outside, or there is no free place for it")
+
     def apply(
         self,
         what: str,
@@ -186,8 +229,8 @@ class Session:
     ) -> bool:
         """Apply a change at a time that a repeated run can reach exactly; return True on success.
 
-        If `change` is None, `value` contains new settings of variables.  If `refused` is true and
-        the change fails, the page receives the reason.
+        Without `change`, `value` contains new settings of variables. If `refused`, the page
+        receives the reason of a failure.
         """
         try:
             now = self.simulation._settle()
@@ -270,10 +313,7 @@ class Session:
         send_json({"is": "file", "name": name + ENDINGS[part], "body": letters})
 
     def output_file(self, name: str) -> bytes:
-        """Return the contents of an output file.
-
-        The signal TERM is deferred until the temporary folder of the file has been removed.
-        """
+        """Return the contents of an output file; TERM waits until its folder is removed."""
         ends: list[int] = []  # not blocked: a thread of a library would receive it
         before = signal.signal(signal.SIGTERM, lambda number, _: ends.append(number))
         try:
@@ -298,16 +338,27 @@ class Session:
         stepping = self.goal and not self.led
         limits = self.goal or (self.simulation.time + self.pace * passed, NEVER, NEVER)
         try:
-            if self.simulation._go_on(limits, SLICE) and self.goal:
+            if self.go_on(limits) and self.goal:
                 return  # a step is shown only when it is complete
         except ProgramError as problem:
             self.ended, self.reason = True, str(problem)
         self.goal = None
+        if self.closing and self.apply("lid", self.closing, refused=False):
+            self.closing = None
+        if len(self.simulation.changes) != self.made:  # a change that the input plans
+            self.send_scene(changed=True)
         self.send_frame()
         if self.ended or stepping or now > self.numbers_sent + NUMBERS_INTERVAL:
             self.send_numbers()
         if self.ended or stepping:
             self.send_state()
+
+    def go_on(self, limits: tuple[float, int, int]) -> bool:
+        """Advance for at most `SLICE`; return True if no limit has been reached so far."""
+        if are_recorded(self.run):
+            record = self.encounters.append
+            return advance_and_record(self.simulation, limits, SLICE, record)
+        return self.simulation._go_on(limits, SLICE)
 
     def send_frame(self) -> None:
         """Send a frame."""
@@ -324,6 +375,7 @@ class Session:
             upper[0],
             lower[1],
             upper[1],
+            self.open_sides,
         ]
         parts = [simulation.position, simulation.velocity]
         if TURNS in run.disk_data:
@@ -331,12 +383,13 @@ class Session:
         if "recycled" in run.nature:
             parts.append(simulation.recycled)
         body = b"".join(np.asarray(part, dtype=np.float32).tobytes() for part in parts)
-        send(b"b", struct.pack("6d", *head) + body)
+        send(b"b", struct.pack("7d", *head) + body)
         self.unconfirmed += 1
         if run.n_disks <= FEW_DISKS and not run.time_step and not self.ended:
             coming = simulation.next_events(EVENTS_SENT)
-            send_json({"is": "events", "next": coming, "happened": self.last_event})
-            self.last_event = None
+            events = {"next": coming, "happened": self.last_event, "encounters": self.encounters}
+            send_json({"is": "events"} | events)
+            self.last_event, self.encounters = None, []
 
     def send_state(self, problem: str = "") -> None:
         """Send the state of the simulation, its changes so far, and the reason of a refusal."""
@@ -345,12 +398,15 @@ class Session:
             for when, what, values, _ in self.actions
             for name, value in (values.items() if what == "change" else [("", words(what, values))])
         ]
-        # If successive changes have the same description, as while the user drags a side, the
-        # description is sent only once.
+        times = {when for when, *_ in self.actions}
+        times |= {value[1] for _, what, value, _ in self.actions if what == "pump"}
+        planned = [one for one in self.simulation.changes if one[0] not in times]
+        changes = sorted(changes + planned, key=lambda one: one[0])
+        # While the user drags a side, the description of this change is sent only once.
         changes = [
             one
             for k, one in enumerate(changes)
-            if k == 0 or one[1:] != changes[k - 1][1:] or one[1]
+            if k == 0 or one[1:] != changes[k - 1][1:] or not one[2].endswith("is dragged")
         ]
         state = {"playing": self.playing, "ended": self.ended, "reason": problem or self.reason}
         send_json({"is": "state", "changes": changes} | state)
@@ -380,6 +436,10 @@ class Session:
             "pressure": value["virial_pressure"] if value["collisions"] > 0 else None,
             "means": means(run, self.samples, energy),
         }
+        if "inside" in value:
+            facts["inside"] = [value[f"{name}/particle_number"] for name in run.names]
+            for name, parts in passages(value).items():
+                facts[name] = sum(value[part] for part in parts)
         send_json({"is": "numbers"} | facts | energies)
 
 
@@ -409,53 +469,6 @@ def refuse(reason: Exception, change: bool = False) -> None:
     send_json({"is": "problems", "change": change, "problems": problems(reason)})
 
 
-def words(what: str, value: object) -> str:
-    """Describe a change by the user that is not the value of an input variable."""
-    if what == "heat":
-        return f"all speeds times {value:g}"
-    if what == "hold":
-        return f"the {next(iter(value)).split('.')[1]} side is dragged"
-    return f"disk {value[0] + 1} {'is moved' if what == 'position' else 'gets energy'}"
-
-
-def typical_speed(simulation: Simulation) -> float:
-    """Return the rms speed of the disks of a simulation, or 1 if all disks are at rest."""
-    return float(np.sqrt(np.mean(np.sum(simulation.velocity**2, axis=1)))) or 1.0
-
-
-def set_row(simulation: Simulation, name: str, disk: int, value: list[float]) -> None:
-    """Set the position or the velocity of one disk of a simulation."""
-    values = np.array(getattr(simulation, name))
-    values[disk] = value
-    setattr(simulation, name, values)
-
-
-def scale_velocities(simulation: Simulation, factor: float) -> None:
-    """Multiply the velocities of all disks of a simulation by a factor."""
-    simulation.velocity = factor * simulation.velocity
-
-
-def script(name: str, text: str, actions: list[tuple], end: float) -> str:
-    """Return a Python script that repeats the run, with all its changes, up to the time `end`."""
-    lines = [f'"""The run of {name} in the laboratory with all its changes, bit for bit."""', ""]
-    quoted = repr(text) if "\\" in text or '"""' in text else f'"""{text}"""'
-    lines += ["from ricochet import Simulation", "", f"INPUT = {quoted}", ""]
-    lines += ["with Simulation(INPUT) as simulation:"]
-    for when, what, _, value in actions:
-        lines.append(f"    simulation.advance(time={when!r})")
-        if what == "heat":
-            lines.append(f"    simulation.velocity = {value!r} * simulation.velocity")
-        elif what in ("position", "velocity"):
-            lines.append(f"    values = simulation.{what}.copy()")
-            lines.append(f"    values[{value[0]}] = {value[1]!r}")
-            lines.append(f"    simulation.{what} = values")
-        else:
-            lines.append(f"    simulation.change({value!r})")
-    lines.append(f"    simulation.advance(time={end!r})")
-    lines.append("    print(simulation.time, simulation.position, sep=chr(10))")
-    return "\n".join(lines) + "\n"
-
-
 def send(kind: bytes, body: bytes) -> None:
     """Write one answer to standard output."""
     sys.stdout.buffer.write(kind + struct.pack(">I", len(body)) + body)
@@ -472,11 +485,7 @@ def send_json(message: dict) -> None:
 
 
 def requests(wait: float | None) -> list[dict]:
-    """Return all requests that have arrived.
-
-    If no request has arrived, the function waits for one.  The function waits at most `wait`
-    seconds, or without limit if `wait` is None.
-    """
+    """Return all requests that have arrived, after waiting for one for at most `wait` seconds."""
     if select.select([0], [], [], wait)[0]:
         data = os.read(0, 1 << 20)
         if not data:
@@ -490,11 +499,7 @@ def requests(wait: float | None) -> list[dict]:
 
 
 def scan(request: dict) -> None:
-    """Simulate several values of an input variable, and send the result for each value.
-
-    If the simulation with a value of the variable fails, the error message is sent instead of a
-    result.
-    """
+    """Simulate several values of an input variable, and send each result or error message."""
     for index, value in enumerate(request["values"]):
         try:
             lines = setting_lines(request["settings"] | {request["variable"]: value})
@@ -509,9 +514,8 @@ def scan(request: dict) -> None:
 def measure(text: str, lines: list[str], name: str, seconds: float) -> tuple[float, float | None]:
     """Return the time average of an observable and its error, after at most `seconds`.
 
-    If the observable is a count (in `COUNTED`), the function returns the rate at which the count
-    grows.  The interval between samples is half a collision per disk.  The average is taken over
-    the second half of the samples.  An error is returned only if the run relaxes to equilibrium.
+    For a count (`COUNTED`) it is the rate of growth. Samples are half a collision per disk apart,
+    and their second half is averaged; there is an error only if the run relaxes to equilibrium.
     """
     samples, began = [], time.perf_counter()
     with Simulation._of(text, lines) as simulation:
@@ -526,10 +530,12 @@ def measure(text: str, lines: list[str], name: str, seconds: float) -> tuple[flo
     if not apart.any():
         raise ValueError("cannot measure: no collisions, or all collisions at the same time")
     if name == "virial_pressure":  # this observable is a mean since the start
-        one = pressure_between(late, count)
+        one = pressure_between(late)
     else:
         gain = np.diff(late[-1]) if name in COUNTED else late[-1][1:] * apart
         one = correlated_mean(gain, apart)
+    if np.isnan(one.mean):
+        raise ValueError("cannot measure: no disk is left in the box")
     return float(one.mean), float(one.error) if settles and np.isfinite(one.error) else None
 
 
@@ -546,6 +552,7 @@ def work(describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
         "heat",
         "place",
         "push",
+        "aim",
         "hold",
         "play",
         "pause",
@@ -554,6 +561,8 @@ def work(describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
         "reach",
         "event",
         "keep",
+        "lid",
+        "pump",
     )
     handlers |= {name: getattr(session, name) for name in own}
     while True:

@@ -1,0 +1,41 @@
+// ---------- scenes of two to four disks: their velocities, restitution and number ----------
+
+// The film of a run of a few disks calls these functions.
+const MOST_DISKS = 4;
+function redefine(name, variable, values) { set(`species.${name}.${variable}`, values.join(',')); }
+function restitution() { return numberOf('contact.restitution'); }
+function bounce(value) { set('contact.restitution', String(value)); }
+
+const namesOfSpecies = () => [...state.groups.filter(({ kind }) => kind === 'species').map(({ place }) => place.slice(8)),
+  ...state.added.filter(([kind]) => kind === 'species').map(([, name]) => name)];
+function canRemoveDisk() { return state.added.some(([kind]) => kind === 'species'); }
+const PLACES = [[0.5, 0.8], [0.5, 0.2], [0.2, 0.8], [0.8, 0.2], [0.2, 0.2], [0.8, 0.8], [0.5, 0.5]];  // of a further disk, in units of the box
+
+// Starts a run with one more disk, like the first one, at rest at a free place.
+function addDisk() {
+  const names = namesOfSpecies(), first = `species.${names[0]}`, radius = textOf(`${first}.radius`);
+  if (names.length >= MOST_DISKS) return;
+  const pair = key => split(valueOf(key)).map(Number), lower = pair('box.lower'), upper = pair('box.upper');
+  const isFree = place => names.every(name => {
+    const at = pair(`species.${name}.position`);
+    return Math.hypot(place[0] - at[0], place[1] - at[1]) > numberOf(`species.${name}.radius`) + 1.1 * parseFloat(radius);
+  });
+  const place = PLACES.map(one => one.map((share, k) => +(lower[k] + share * (upper[k] - lower[k])).toPrecision(6))).find(isFree);
+  const name = Array.from({ length: MOST_DISKS }, (_, k) => `disk${k + 1}`).find(one => !names.includes(one));
+  if (!place) { tell('There is no free place for another disk.', true); return; }
+  state.added.push(['species', name]);
+  for (const [variable, text] of [['mass', '1'], ['radius', radius], ['position', place.join(',')], ['velocity', '0,0']]) state.settings[`species.${name}.${variable}`] = text;
+  buildEverything();
+  run();
+}
+
+// Starts a run without the disk that was added last.
+function removeDisk() {
+  const at = state.added.findLastIndex(([kind]) => kind === 'species');
+  if (at < 0) return;
+  const [[, name]] = state.added.splice(at, 1);
+  state.settings = Object.fromEntries(Object.entries(state.settings).filter(([key]) => placeOf(key) !== `species.${name}`));
+  buildEverything();
+  run();
+}
+

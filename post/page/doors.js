@@ -1,0 +1,16 @@
+// ---------- buttons of open systems: they let disks in, and open or close sides ----------
+
+const LET_IN = 50;  // largest number of disks that a button lets in
+
+// Labels the buttons of the newest run: one for each source, and one for each side that may be open.
+function buildDoors({ sources, sides, surfaces }) {
+  const ofSources = sources.map(source => [`add ${LET_IN} disks${sources.length > 1 ? ` (${source})` : ''}`, { do: 'pump', source, count: LET_IN }]);
+  const ofSides = sides.flatMap(({ open }, side) => open === undefined ? [] : [[`${open ? 'close' : 'open'} ${surfaces[side]}`, { do: 'lid', side, open: !open }]]);
+  const all = [...ofSources, ...ofSides], doors = $('doors');
+  while (doors.children.length > all.length) doors.lastChild.remove();
+  while (doors.children.length < all.length) doors.append(make('button', { type: 'button' }));
+  all.forEach(([textContent, wish], k) => Object.assign(doors.children[k], { textContent, onclick: () => filmOf(current()).send(wish) }));
+  doors.hidden = !all.length;
+}
+
+const doorInWords = (key, value) => `the ${key.split('.')[1]} side is ${/^\W*t/i.test(value) ? 'open' : 'closed'}`;

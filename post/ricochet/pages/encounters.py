@@ -1,0 +1,67 @@
+"""Collisions of a few disks that a page shows, with all velocities before and after each."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from ..reading.reader import Run
+from ..running.simulation import NEVER, Simulation
+
+MOST_DISKS = 4  # largest number of disks whose collisions are recorded
+MOST_RECORDED = 50  # largest number of collisions that are recorded between two frames
+
+
+def are_recorded(run: Run) -> bool:
+    """Return whether the collisions of a run are recorded."""
+    is_few = 2 <= run.n_disks <= MOST_DISKS and "open" not in run.nature
+    return is_few and not run.time_step and not run.periodic.any()
+
+
+def advance_and_record(
+    simulation: Simulation,
+    limits: tuple[float, int, int],
+    patience: float,
+    record: Callable[[dict], None],
+) -> bool:
+    """Advance for at most `patience` [s], and call `record` for each collision of two disks.
+
+    The engine stops at each event, which changes no bit of the result. The recorded dictionary
+    contains the time, the indices i and j, the velocities of all disks before and after the
+    collision (N, 2), and the speeds of approach and separation. `limits` are a time, a number of
+    collisions and a number of events; the result is True if none is reached. The box has no
+    periodic sides.
+    """
+    deadline, recorded = time.perf_counter() + patience, 0
+    end, _, last = limits
+    while recorded < MOST_RECORDED and time.perf_counter() < deadline:
+        coming = simulation.next_events(1)
+        if not coming or coming[0][0] >= end or simulation.events >= last:
+            break
+        when, i, j = coming[0]
+        gravity = np.asarray(simulation.parameters["box"]["gravity"], dtype=float)
+        before = simulation.velocity + gravity * (when - simulation.time)
+        if simulation._go_on((np.inf, NEVER, simulation.events + 1), patience):
+            return True
+        if j > 0:
+            record(described(simulation, i - 1, j - 1, before))
+            recorded += 1
+    return simulation._go_on(limits, patience)
+
+
+def described(simulation: Simulation, i: int, j: int, before: np.ndarray) -> dict:
+    """Describe the collision of disks i and j that has just occurred."""
+    after, place = simulation.velocity, simulation.position
+    normal = (place[j] - place[i]) / np.hypot(*(place[j] - place[i]))
+    approach, separation = (float((v[i] - v[j]) @ normal) for v in (before, after))
+    return {
+        "time": simulation.time,
+        "disks": [i, j],
+        "before": before.tolist(),
+        "after": after.tolist(),
+        "approach": approach,
+        "separation": -separation,
+    }
+
+
+__all__ = ["advance_and_record", "are_recorded"]
