@@ -3,9 +3,12 @@
     python post/animate.py runs/gas.h5 -o gas.mp4              needs ffmpeg, see below
     python post/animate.py runs/crater.h5 --colour speed --count 500 --fps 30
 
-If the name of the film has no file name extension, the script appends .mp4 if ffmpeg is installed,
-and .gif otherwise.  Without -o the film has the name of the run.  The command `python -m pip
-install imageio-ffmpeg` installs ffmpeg if the system does not contain it.
+Without -o the film is named after the run.  If the name has no ending, the film is written as .mp4
+if ffmpeg is installed, otherwise as .gif.  `.venv/bin/python -m pip install imageio-ffmpeg`
+installs ffmpeg.
+
+see also
+  player.py (film for a browser), docs/guides/films.md
 """
 
 from contextlib import suppress
@@ -34,7 +37,8 @@ from ricochet.figures.drawing import (
     warn,
 )
 from ricochet.reading.files import destination, installing
-from ricochet.script import chosen_frames, command_line, launch, positive, report
+from ricochet.reports.options import chosen_frames, positive
+from ricochet.script import command_line, launch, report
 
 from matplotlib import animation
 from matplotlib.collections import EllipseCollection
@@ -107,7 +111,14 @@ def animate(
 
 def main() -> None:
     parser = command_line(
-        __doc__, "RUN.mp4", one=True, csv=False, frames=None, count=300, colour=None
+        __doc__,
+        "RUN.mp4",
+        one=True,
+        csv=False,
+        open_systems=True,
+        frames=None,
+        count=300,
+        colour=None,
     )
     parser.add_argument(
         "--fps", type=positive, metavar="N", default=25, help="frames per second [25]"

@@ -5,10 +5,11 @@
     python post/export.py runs/gas.h5 -o gas.gsd     GSD, for HOOMD-blue, freud and OVITO
     python post/export.py runs/gas.h5 -o gas.lammpstrj     a dump file of LAMMPS
 
-The extended XYZ file contains two position coordinates of each disk; therefore OVITO treats the
-system as two-dimensional. The extended XYZ file also contains the velocity, radius, mass and any
-further quantities of each disk (such as the orientation), the box, and the time.  Numbers are
-written with full precision.
+The extended XYZ file has full precision.  It contains two coordinates of each disk, its velocity,
+radius, mass and further quantities such as the orientation, the box, and the time.
+
+see also
+  docs/guides/other-programs.md
 """
 
 import math
@@ -17,8 +18,10 @@ from pathlib import Path
 from ricochet import Run, RunError
 from ricochet.reading.bridges import write_gsd, write_lammps
 from ricochet.reading.files import destination
-from ricochet.script import chosen_frames, command_line, launch, report
+from ricochet.reports.options import chosen_frames
+from ricochet.script import command_line, launch, report
 
+import numpy as np
 from tqdm import tqdm
 
 HEAD = "time,id,species,x,y,vx,vy,radius,mass"
@@ -26,14 +29,16 @@ PROPERTIES = "species:S:1:pos:R:2:velo:R:2:radius:R:1:mass:R:1"
 
 
 def rows(run: Run, frame: int) -> list[list[str]]:
-    """Return the quantities of each disk in a frame as text.
+    """Return the quantities of each disk in the box in a frame as text.
 
     The quantities are species, x, y, vx, vy, radius and mass, followed by any further quantities
-    that the run contains.
+    that the run contains, and the id of the disk.
     """
-    species = [run.names[s - 1] for s in run.species]
+    inside = run.in_box(frame)
+    species = [run.names[run.species[k] - 1] for k in inside]
     moving = [*run.position[frame].T, *run.velocity[frame].T, run.radius, run.mass]
-    columns = [one.tolist() for one in (*moving, *(own[frame] for own in run.disk_data.values()))]
+    arrays = (*moving, *(own[frame] for own in run.disk_data.values()), np.arange(run.n_disks) + 1)
+    columns = [one[inside].tolist() for one in arrays]
     return [list(map(str, disk)) for disk in zip(species, *columns, strict=True)]
 
 
@@ -52,18 +57,15 @@ def xyz_frame(run: Run, frame: int) -> str:
         f"Time={run.time[frame]} Properties={properties}"
     )
     lines = [
-        " ".join((species.replace(" ", "_"), *numbers, str(k)))
-        for k, (species, *numbers) in enumerate(rows(run, frame), start=1)
+        " ".join((species.replace(" ", "_"), *numbers)) for species, *numbers in rows(run, frame)
     ]
-    return "\n".join([str(run.n_disks), head, *lines, ""])
+    return "\n".join([str(len(lines)), head, *lines, ""])
 
 
 def csv_frame(run: Run, frame: int) -> str:
     """Return the lines of a frame with comma-separated values."""
     time = str(run.time[frame])
-    return "".join(
-        ",".join((time, str(k), *disk)) + "\n" for k, disk in enumerate(rows(run, frame), start=1)
-    )
+    return "".join(",".join((time, disk[-1], *disk[:-1])) + "\n" for disk in rows(run, frame))
 
 
 TEXTS = {".xyz": xyz_frame, ".csv": csv_frame}
@@ -79,7 +81,9 @@ def write_text(run: Run, path: Path, frames: list[int]) -> None:
 
 
 def main() -> None:
-    parser = command_line(__doc__, "RUN.xyz", one=True, csv=False, frames=None, count=None)
+    parser = command_line(
+        __doc__, "RUN.xyz", one=True, csv=False, open_systems=True, frames=None, count=None
+    )
     args = parser.parse_args()
     (run,) = args.runs
     path = args.output or Path(run.path.name).with_suffix(".xyz")

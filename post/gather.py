@@ -2,13 +2,16 @@
 
     python post/gather.py runs/scan --csv scan.csv
 
-The table contains a row for each member run.  The first columns are the name of the run, the values
-of all variables that the sweep changes, and the seed.  The next columns contain the state of the
-run (finished, unfinished or failed), the reason of a failure, and the wall time in seconds.  The
-last columns of the table are the final values of all scalar observables.  For gases that cool, the
-column flow_share contains the share of flows in the kinetic energy of the last frame, which is 0 on
-average in a homogeneous gas.  The script prints a warning if some of these gases are not
-homogeneous.
+table (a row for each member run)
+  member, overrides, seed    name of the run, and the variables that the sweep changes
+  state, reason              finished, unfinished or failed, and why
+  wall_time                  [s]
+  observables                final values of all scalar observables
+  flow_share                 for cooling gases: share of flows in the kinetic energy of the last
+                             frame, 0 on average in a homogeneous gas; with a warning if it is not
+
+see also
+  docs/guides/ensembles.md
 """
 
 import argparse

@@ -2,12 +2,14 @@
 
     python post/scatterers.py 100000 0.01 --radius 0.9 --seed 1 -o scatterers.txt
 
-The file can be used as `obstacle.file` of an input.  The centres are independent and uniformly
-distributed in a square from (0, 0) to (L, L); therefore circles can overlap.  The density n of the
-obstacles is the number of circles per unit of area.  The script prints L = sqrt(number / density),
-which must be used for both components of `box.upper`; all sides of the box must be periodic.  The
-theory of the Lorentz gas uses the reduced density n R^2, where R is the sum of the radii of tracer
-and circle.
+The file is for `obstacle.file` of an input with periodic sides.  The independent centres are
+distributed uniformly in a square, so that circles can overlap.  The script prints the side of the
+square, sqrt(number / density), for both components of `box.upper`.  The density is the number of
+circles per area; the reduced density of the theory is n R^2, where R is the sum of the radii of
+tracer and circle.
+
+see also
+  lorentz.py, docs/guides/billiards.md
 """
 
 import argparse

@@ -4,19 +4,20 @@
     python post/snapshot.py runs/gas.h5 --frames 0,10,-1 -o gas.png    chosen frames side by side
     python post/snapshot.py runs/gravity.h5 --count 12 --quiver        twelve frames, evenly spread
 
-The option --colour selects what the colours show.  The choices are species, speed, displacement,
-collisions, spin and psi6. With --colour displacement, colours show the distance of each disk from
-its position in the first frame.  With --colour collisions, colours show the number of collisions of
-each disk since the start.  The spin is the angular velocity of disks that can rotate.  With
---colour psi6, colours show the phase of the bond-orientational order parameter psi6 of each disk,
-relative to the phase of the mean of psi6 over all disks.  All frames have the same colour scale,
-which begins at 0, unless --per-frame is given.  With --log the colour scale is logarithmic.  If
-colours show a quantity other than the species, all disks except those of the first species have an
-outline.  A disk that overlaps a periodic side is drawn on both sides of the box.  If disks can
-rotate, a line from the centre of each disk shows its orientation.  If the run wrote frames after a
-fixed number of events or collisions, the title of each panel contains the number of events or
-collisions.  Disks that would be too small to be visible are drawn enlarged, and the title states
-the factor.
+colours (--colour)
+  species, speed    species has a legend, all others a scale common to all frames from 0 on
+  displacement      distance from the position in the first frame
+  collisions        number of collisions since the start
+  spin              angular velocity of disks that can rotate
+  psi6              phase of the bond order of a disk, relative to that of the mean over all disks
+
+picture
+  lines, outlines   orientations of rotating disks; species other than the first
+  periodic sides    a disk that overlaps one is drawn on both sides of the box
+  titles            time, events or collisions, and the factor by which tiny disks are enlarged
+
+see also
+  player.py, animate.py, trajectory.py
 """
 
 import argparse
@@ -25,7 +26,8 @@ from ricochet import Run, drawing
 from ricochet.analysis.thermodynamics import packing
 from ricochet.figures.drawing import plt
 from ricochet.reading.units import UNNAMED
-from ricochet.script import chosen_frames, command_line, frame_list, launch, report
+from ricochet.reports.options import chosen_frames, frame_list
+from ricochet.script import command_line, launch, report
 
 import numpy as np
 from matplotlib.quiver import Quiver
@@ -35,7 +37,7 @@ from matplotlib.colors import LogNorm, Normalize, to_rgba_array
 def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
     """Return a colour scale for the given values; the few largest values exceed the scale."""
     if colour in ("psi6", "spin"):
-        top = np.quantile(np.abs(values), 0.995) or 1.0
+        top = np.nanquantile(np.abs(values), 0.995) or 1.0
         return Normalize(*drawing.limits_of(colour, top))
     moved = values[values > 0]
     if not len(moved) or not log:
@@ -75,13 +77,13 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         values = np.array([drawing.values_of(run, frame, colour) for frame in frames])
         whole = scale(values, args.log, colour)
         bar = {"label": drawing.label_of(run, colour)}
-    longest = max(float(np.max(run.speed(frame))) for frame in frames) or 1.0
+    longest = max(float(np.nanmax(run.speed(frame), initial=0)) for frame in frames) or 1.0
     # The longest velocity arrow is as long as a tenth of the box.
     arrows = {"angles": "xy", "scale_units": "xy", "scale": longest / (0.1 * run.edges.max())}
-    arrows |= {"width": 0.005, "zorder": 4, "color": "0.2"}
+    # Heads of short arrows shrink, and arrows beyond the walls are not cut.
+    arrows |= {"width": 0.005, "minshaft": 2, "clip_on": False, "zorder": 4, "color": "0.2"}
     if colour == "species":  # darker shades of the colours of the disks, for contrast
-        darker = (0.6, 0.6, 0.6, 1)
-        arrows["color"] = to_rgba_array(drawing.species_colours(run)) * darker
+        dark = to_rgba_array(drawing.species_colours(run)) * (0.6, 0.6, 0.6, 1)
     for k, axes in enumerate(panels.flat):
         if k >= len(frames):
             axes.set_visible(False)
@@ -101,17 +103,19 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
             figure.colorbar(disks, ax=axes, shrink=0.7, extend=beyond, **bar)
         axes.set_title(drawing.moment(run, frames[k]))
         if args.quiver:
-            drawn = axes.quiver(*run.position[frames[k]].T, *run.velocity[frames[k]].T, **arrows)
+            seen = run.in_box(frames[k])
+            vectors = (*run.position[frames[k]][seen].T, *run.velocity[frames[k]][seen].T)
+            if colour == "species":
+                arrows["color"] = dark[seen]
+            drawn = axes.quiver(*vectors, **arrows)
+            drawn.set_in_layout(False)  # arrows beyond the walls need no room
             if k == 0:
                 draw_key(axes, run, drawn, longest)
-    if colour == "species":
-        drawing.species_legend(figure, run)
-    else:
-        drawing.species_legend(figure, run, by_outline=True)
+    drawing.species_legend(figure, run, by_outline=colour != "species")
     if colour != "species" and not args.per_frame:
         beyond = drawing.exceeded(values, whole.vmin, whole.vmax)
         figure.colorbar(disks, ax=panels, shrink=0.8, aspect=30, extend=beyond, **bar)
-    fluid = not run.nature & {"gravity", "obstacles"} and run.n_disks > 1
+    fluid = not run.nature & {"gravity", "obstacles", "open"} and run.n_disks > 1
     dense = f",  η = {packing(run):.4g}" if fluid else ""
     larger = drawing.note_on_size(panels.flat[0], run)
     figure.suptitle(drawing.caption([run]) + dense + larger)
@@ -119,12 +123,11 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
 
 
 def main() -> None:
-    parser = command_line(__doc__, "snapshot.png", one=True, frames=None, count=None, colour=None)
+    chosen = {"frames": None, "count": None, "colour": None}
+    parser = command_line(__doc__, "snapshot.png", one=True, open_systems=True, **chosen)
     parser.add_argument("--quiver", action="store_true", help="draw velocities as arrows")
     parser.add_argument("--log", action="store_true", help="use a logarithmic colour scale")
-    parser.add_argument(
-        "--per-frame", action="store_true", help="use a separate colour scale for each frame"
-    )
+    parser.add_argument("--per-frame", action="store_true", help="a colour scale for each frame")
     args = parser.parse_args()
     (run,) = args.runs
     which = args.frames or (None if args.count else frame_list("-1"))
@@ -133,8 +136,13 @@ def main() -> None:
     rows = []
     for frame in frames:
         row = {"frame": frame, **drawing.count_at(run, frame), "time": float(run.time[frame])}
-        row |= {"mean_speed": float(run.speed(frame).mean())}
-        rows.append(row | {"kinetic_energy": float(run.kinetic_energy(frame).mean())})
+        inside = run.in_box(frame)
+        if run.present is not None:
+            row |= {"inside": len(inside)}
+        means = {"mean_speed": run.speed(frame), "kinetic_energy": run.kinetic_energy(frame)}
+        for name, values in means.items():
+            row[name] = float(values[inside].mean()) if len(inside) else np.nan
+        rows.append(row)
     report(args, figure, rows)
 
 

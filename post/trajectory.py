@@ -3,9 +3,9 @@
     python post/trajectory.py runs/sinai.h5 -o sinai.png               all disks (at most 12)
     python post/trajectory.py runs/sinai.h5 --disks 1,5 --frames :200  two of them, 200 frames
 
-Positions in successive frames are connected by straight lines.  The straight lines are the exact
-trajectories if there is no gravity and the run has a frame at every event
-(output.frames_every_events = 1).  Several runs are drawn side by side.
+Straight lines connect the positions in successive frames.  Without gravity they are exact if the
+run has a frame at every event (output.frames_every_events = 1).  Several runs are drawn side by
+side.
 """
 
 from ricochet import Run, RunError
@@ -19,7 +19,8 @@ from ricochet.figures.drawing import (
     note_on_size,
     plt,
 )
-from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
+from ricochet.reports.options import chosen_disks, chosen_frames
+from ricochet.script import command_line, launch, report
 
 import numpy as np
 from matplotlib.patches import Circle

@@ -1,14 +1,11 @@
 """Start Ricochet, read its output files, and analyse them.
 
-    import ricochet
-    run = ricochet.run("input/gas.nml")
-    run = ricochet.read_run("runs/gas.h5")
-    curve = ricochet.structure.pair_correlation(run)
+    import ricochet run = ricochet.run("input/gas.nml") run = ricochet.read_run("runs/gas.h5") curve
+    = ricochet.structure.pair_correlation(run)
 
-The modules are in sub-packages, which `README.md` in this folder describes.  Each module can also
-be imported by a short name: the statement `from ricochet import structure` imports
-`ricochet.analysis.structure`.  A module is loaded when it is first used.  Therefore `import
-ricochet` alone loads neither Matplotlib nor a web server.
+The modules are in sub-packages, which `README.md` in this folder describes, and have short names:
+`from ricochet import structure` imports `ricochet.analysis.structure`. A module is loaded when it
+is first used, so that `import ricochet` alone loads neither Matplotlib nor a web server.
 """
 
 import sys
@@ -21,6 +18,8 @@ from .reading.bridges import mdanalysis_universe
 from .reading.files import RunError
 from .reading.frames import Frames, Series
 from .reading.reader import Event, EventLog, Frame, Obstacle, Run, read_run
+from .reports import analyse
+from .reports import analyses as analyses  # not listed: an object, which has no docstring
 from .running.ensembles import ensemble, sweep
 from .running.program import ProgramError, example, run
 from .running.simulation import Simulation
@@ -39,6 +38,7 @@ __all__ = [
     "RunError",
     "Series",
     "Simulation",
+    "analyse",
     "ensemble",
     "example",
     "mdanalysis_universe",
@@ -52,10 +52,10 @@ if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__`
     from .analysis import cooling as cooling
     from .analysis import correlations as correlations
     from .analysis import crater as crater
+    from .analysis import driven as driven
     from .analysis import equilibrium as equilibrium
     from .analysis import estimates as estimates
     from .analysis import fields as fields
-    from .analysis import paths as paths
     from .analysis import speed_laws as speed_laws
     from .analysis import speeds as speeds
     from .analysis import statistics as statistics
@@ -65,11 +65,17 @@ if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__`
     from .analysis import transport as transport
     from .figures import drawing as drawing
     from .figures import film as film
+    from .figures import film_data as film_data
+    from .figures import sheet as sheet
+    from .figures import web_page as web_page
+    from .pages import actions as actions
+    from .pages import encounters as encounters
     from .pages import lab as lab
     from .pages import live as live
     from .pages import numbers as numbers
     from .pages import worker as worker
     from .predictions import hard_disks as hard_disks
+    from .predictions import mixtures as mixtures
     from .predictions import theory as theory
     from .predictions import walls as walls
     from .reading import arrays as arrays
@@ -81,10 +87,16 @@ if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__`
     from .reading import frames as frames
     from .reading import layout as layout
     from .reading import nature as nature
+    from .reading import paths as paths
     from .reading import reader as reader
     from .reading import records as records
     from .reading import results as results
     from .reading import units as units
+    from .reports import groups as groups
+    from .reports import options as options
+    from .reports import registry as registry
+    from .reports import result as result
+    from .reports import tables as tables
     from .running import engine as engine
     from .running import ensembles as ensembles
     from .running import inputs as inputs

@@ -1,7 +1,6 @@
 """Short module names, such as `ricochet.structure` for `ricochet.analysis.structure`.
 
-With a short name, users do not have to know the sub-package of a module.  A short name and the full
-name refer to the same module object, and therefore each class of the module exists only once.
+Both names refer to the same module object, so that each of its classes exists only once.
 """
 
 import sys
@@ -13,7 +12,7 @@ from types import ModuleType
 
 from .commands import HERE
 
-FOLDERS = ("reading", "running", "predictions", "analysis", "figures", "pages")
+FOLDERS = ("reading", "running", "predictions", "analysis", "figures", "reports", "pages")
 
 
 def modules() -> dict[str, str]:

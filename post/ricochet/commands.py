@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
 """Commands such as ricochet-player and ricochet-lab, one for each script in post/.
 
-For each command, `make install` makes a copy of this file with the name of the command.  A command
-that pip has installed calls the function `main`.  Scripts use the simulation program in the folder
-of the command, unless the environment variable RICOCHET names another program.
+`make install` makes a copy of this file with the name of each command; a command that pip has
+installed calls `main`. Scripts use the program in the folder of the command, or that of RICOCHET.
 """
 
 import os

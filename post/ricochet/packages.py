@@ -1,8 +1,4 @@
-"""Check whether the required packages are installed, and report missing packages.
-
-Because all scripts import `ricochet` before other packages, the scripts themselves do not have to
-check whether packages are installed.
-"""
+"""Report missing packages; all scripts import `ricochet` before other packages."""
 
 import sys
 from importlib.util import find_spec

@@ -2,8 +2,6 @@
 
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +13,7 @@ from laboratory import laboratory
 from laboratory_page import moving
 from ricochet import read_run
 from synthetic_run import ROOT, run_script
-from whole_runs import FINISHED, PATIENCE, write_input
+from whole_runs import FINISHED, write_input
 
 
 @pytest.fixture
@@ -78,28 +76,21 @@ def playing(browser, tmp_path):
     return play
 
 
-@pytest.fixture
-def opened(browser, program, tmp_path, monkeypatch):
-    """Return the browser with the laboratory when the first run moves."""
-    monkeypatch.setenv("RICOCHET", str(program))
-    command = [sys.executable, ROOT / "post/lab.py", "--no-open"]
-    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
-    try:
-        browser.open(process.stdout.readline().split()[0])
-        yield moving(browser)
-        assert browser.complaints() == []
-    finally:
-        browser.open("about:blank")
-        process.terminate()
-        assert process.wait(PATIENCE) == 0
-
-
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def address(program, tmp_path_factory):
-    """Return the address of a laboratory for tests that do not change it."""
+    """Return the address of a laboratory for all tests that do not end its processes."""
     with laboratory(program, tmp_path_factory.mktemp("lab")) as (process, address):
         yield address
         assert process.poll() is None
+
+
+@pytest.fixture
+def opened(browser, address):
+    """Return the browser with a new page of the laboratory when its first run moves."""
+    browser.open(address)
+    yield moving(browser)
+    assert browser.complaints() == []
+    browser.open("about:blank")  # ends the runs
 
 
 #: Settings of the gases that the fixture `bulk` simulates.

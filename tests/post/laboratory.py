@@ -12,17 +12,20 @@ from contextlib import asynccontextmanager, contextmanager, suppress
 import aiohttp
 
 from synthetic_run import ROOT
-from whole_runs import PATIENCE
+from whole_runs import PATIENCE, with_parent
 
-HEAD = 6  # numbers before the positions
+HEAD = 7  # numbers before the positions
 
 
 @contextmanager
 def laboratory(program, folder, *words, **options):
-    """Start a laboratory with a folder for temporary files; yield its process and address."""
+    """Start a laboratory with a folder for temporary files; yield its process and address.
+
+    Without the option --port it has a port that is free.
+    """
     own = os.environ | {"RICOCHET": str(program), "TMPDIR": str(folder)}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    command = [sys.executable, ROOT / "post/lab.py", *words]
+    command = with_parent(sys.executable, ROOT / "post/lab.py", "--port", "0", *words)
     process = subprocess.Popen(command, cwd=folder, env=own, **pipes, **options)
     try:
         line = process.stdout.readline()

@@ -3,7 +3,6 @@
 import json
 
 from synthetic_run import ROOT
-from whole_runs import wait_for
 
 CHOOSER = json.loads((ROOT / "input/chooser.json").read_text())
 
@@ -18,7 +17,7 @@ def moving(browser, than=0):
     seen = """const box = current(); if (!(box?.run > arguments[0]) || busy || again) return false;
         const { stream, moment } = filmOf(box).inside();
         return stream.run === box.run && moment.time > 0"""
-    wait_for(lambda: browser.run(seen, than))
+    browser.until(seen, than)
     return browser
 
 
@@ -45,6 +44,4 @@ def type_at(browser, number, text):
     """Type a text beside a slider, followed by Enter."""
     field = "document.querySelectorAll('.slider input:not([type])')[arguments[0]].select()"
     browser.run(field, number)
-    for key in text or "\ue003":  # backspace
-        browser.press(key)
-    browser.press("\ue007")  # enter
+    browser.press(*(text or "\ue003"), "\ue007")  # backspace, enter

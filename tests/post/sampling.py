@@ -1,5 +1,7 @@
 """Tests with random samples: few samples in `make test`, many with the mark `statistics`."""
 
+from collections.abc import Container, Iterable
+
 import numpy as np
 import pytest
 from scipy.stats import binom
@@ -8,6 +10,11 @@ from ricochet import estimates
 
 #: Mark of a test that needs much processor time for many random samples.
 STATISTICS = pytest.mark.statistics
+
+
+def mostly(values: Iterable, kept: Container) -> list:
+    """Return values of a parameter of a test, of which `make test` tests only the kept ones."""
+    return [one if one in kept else pytest.param(one, marks=STATISTICS) for one in values]
 
 
 def samples(few: int, many: int) -> pytest.MarkDecorator:

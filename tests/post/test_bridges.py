@@ -1,6 +1,7 @@
 """Runs are exchanged with OVITO, MDAnalysis, GSD, LAMMPS, freud, pandas, xarray and CSV."""
 
 import random
+import re
 import sys
 from collections import Counter
 from pathlib import Path
@@ -322,7 +323,7 @@ TORN = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS pp pp pp\n
 WRONG = {
     "": "has no frame -1; it is no dump file of LAMMPS",
     TORN: "has no ITEM: ATOMS",
-    TORN + "ITEM: ATOMS id x y\n": "is cut short: a frame does not consist of 1 lines of 3 columns",
+    TORN + "ITEM: ATOMS id x y\n": "is cut short: it does not consist of 1 lines of 3 columns",
     TORN + "ITEM: ATOMS id x y\n1 2\n": "is cut short",
     TORN + "ITEM: ATOMS id q\n1 2\n": r"has no columns x and y \(or xu and yu, or xs and ys\)",
     TORN + "ITEM: ATOMS x y\n1 a\n": r"frame -1 is damaged \(could not convert",
@@ -401,7 +402,7 @@ def test_a_damaged_file_is_answered_in_one_line_or_read(damaged, kind):
             assert all(np.isfinite(frame.disks[name]).all() for name in ("position", "radius"))
             answers["read"] += 1
     assert 20 < answers.pop("read") < 380
-    assert all(f"damaged.{kind}: " in answer and "\n" not in answer for answer in answers)
+    assert all(re.search(rf"damaged\.{kind}: [^\n]*frame.*$", answer) for answer in answers)
 
 
 @pytest.mark.parametrize("group", ["particles", "bonds", "pairs"])

@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-import lorentz
-import lyapunov
+from ricochet.reports.trajectories import lorentz
+from ricochet.reports.trajectories import lyapunov
 from ricochet import RunError, read_run, statistics
 from synthetic_run import refusal, run_script, write_run
 

@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 
 import lab
-import player
 from laboratory_page import CHOOSER
 from ricochet import Simulation
+from ricochet.figures.web_page import chooser
 from ricochet.pages.lab import form
 from synthetic_run import ROOT
 
@@ -23,7 +23,7 @@ def test_every_input_has_its_place_in_the_chooser_and_a_picture_of_now():
     pictures = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(pictures)
     assert {path.stem for path in INPUTS} == CHOOSER.keys()
-    assert [one["name"] for one in player.chooser(INPUTS)] == list(CHOOSER)
+    assert [one["name"] for one in chooser(INPUTS)] == list(CHOOSER)
     for path in INPUTS:
         own, drawn = CHOOSER[path.stem], ROOT / f"input/pictures/{path.stem}.png"
         assert own["title"] and own["subject"] and own["sentence"].endswith((".", "?"))

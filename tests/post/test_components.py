@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-import driven
-from ricochet import RunError, fields, speeds
+from ricochet import RunError, driven, fields, speeds
 from synthetic_run import written
 
 HEAT = {"light": (1.0, 3.0), "heavy": (2.0, 0.5)}  # kT_x and kT_y

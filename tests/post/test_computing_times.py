@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-import cost
-import scaling
+from ricochet.reports.program import cost
+import ricochet
+from ricochet.reports.program import scaling
 from ricochet import RunError, read_run
 from ricochet.figures.drawing import plt
 from synthetic_run import drawn, write_run
@@ -21,7 +22,7 @@ def test_the_legend_of_the_cost_names_each_method_once(tmp_path):
         read_run(timed(tmp_path / f"{name}.h5", 9, name, collisions_per_second=1e5))
         for name in cost.LABELS
     ]
-    figure = cost.draw(runs, cost.costs(runs), {}, 128, 1e4)
+    figure = ricochet.analyse("cost", runs).figure()
     texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert [text.partition(": ")[0] for text in texts] == [*cost.LABELS]
     assert [name for name, text in cost.LABELS.items() if text.startswith(f"{name}:")] == []

@@ -5,8 +5,10 @@ import csv
 import numpy as np
 import pytest
 
-import haff
+import ricochet
+from ricochet.reports.grains import haff
 from ricochet import (
+    RunError,
     cooling,
     equilibrium,
     estimates,
@@ -44,6 +46,19 @@ def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp
     assert np.isnan(rate.error), "of a single run"
     drawn(tmp_path, "haff", bulk[2])
     drawn(tmp_path, "equation_of_state", *bulk[:2])
+
+
+def test_panels_of_ratios_that_share_an_axis_hold_both_curves(simulated):
+    run = simulated(
+        """&box boundary = 'periodic', 'periodic' /
+        &species count = 300 packing_fraction = 0.05 temperature = 1 /
+        &contact restitution = 0.9 restitution_law = 'power' reference_speed = 10 /
+        &stop collisions_per_disk = 60 / &output observables_every_collisions_per_disk = 1 /"""
+    )
+    *_, left, right = haff.ANALYSIS(run, {}).figure().axes
+    highest = [max(np.nanmax(line.get_ydata()) for line in axes.lines) for axes in (left, right)]
+    assert left.get_ylim() == right.get_ylim()
+    assert max(highest) <= left.get_ylim()[1] <= haff.RATIO_TOP
 
 
 def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, simulated, tmp_path):
@@ -104,9 +119,14 @@ def test_cooling_averages_over_runs_on_one_grid(tmp_path):
 
 
 def test_a_gas_of_one_kind_cools_without_a_ratio(tmp_path, rng):
-    path = gas(tmp_path / "gas.h5", rng, names=("all",))  # all/kinetic_energy, disks of that name
-    (row, *_) = drawn(tmp_path, "cooling", path)
-    assert not any("ratio" in name for name in row)
+    """The title contains the rule of the walls only if there are walls."""
+    for periodic in (False, True):
+        more = {"names": ("all",), "periodic": (periodic, periodic)}  # disks of the name all
+        path = gas(tmp_path / f"{periodic}.h5", rng, **more)
+        (row, *_) = drawn(tmp_path, "cooling", path)
+        assert not any("ratio" in name for name in row)
+        title = ricochet.analyse("cooling", [read_run(path)]).figure().get_suptitle()
+        assert ("wall rule" in title) != periodic
 
 
 @pytest.mark.parametrize("end", [25.0, None])
@@ -145,6 +165,24 @@ def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):
     short, (t, r) = run(0.0, 51)
     late = np.mean(r[25:] / t[25:])
     assert cooling.steady_ratio([short], law).mean == pytest.approx(late)
+
+
+def test_the_ratio_of_temperatures_is_a_mean_over_collisions_per_disk(tmp_path, rng):
+    """In run k the ratio grows linearly with the collisions per disk, but not with time."""
+    runs, tau = [], np.linspace(0, 12, 121)
+    for k in range(3):
+        v = rng.normal(size=(1, 40, 2))
+        energy = {"a": np.exp(-tau / 4), "b": (1 + k + tau / 10) * np.exp(-tau / 4)}
+        observables = {f"{name}/kinetic_energy": own for name, own in energy.items()}
+        observables |= {"collisions": 20 * tau, "all/kinetic_energy": sum(energy.values()) / 2}
+        more = {"mass": np.tile([1, 4], 20), "species": np.tile([1, 2], 20), "names": ("a", "b")}
+        more |= {"observables": observables, "observable_time": np.exp(tau / 4)}
+        runs.append(written(tmp_path / f"{k}.h5", v, v, periodic=(True, True), **more))
+    assert cooling.temperature_ratio(runs, 4.03, 8.05).mean == pytest.approx(2.604)
+    late = cooling.temperature_ratio(runs, 10, 40)
+    assert late.mean == pytest.approx(3.1) and late.error == pytest.approx(1.32 / 3**0.5, rel=0.01)
+    with pytest.raises(RunError, match="ends after 12 collisions per disk"):
+        cooling.temperature_ratio(runs, 12, 40)
 
 
 @pytest.mark.parametrize(("count", "kinds"), [(60, (1, 4)), (400, (1, 1)), (3000, (1, 25))])

@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
-import crater as crater_figure
-import crater_scan
-import equation_of_state
+import ricochet
+from ricochet.reports.grains import crater_scan
+from ricochet.reports.equilibrium import equation_of_state
 import player
-import scattering
+from ricochet.reports.trajectories import scattering
 from ricochet import crater, read_run, theory
 from ricochet.analysis import statistics
 from ricochet.figures.drawing import plt
-from ricochet.script import distinct, grouped
+from ricochet.reports.groups import Group, grouped
+from ricochet.reports.registry import distinct
+from ricochet.reports.result import Result
 from sampling import held_as_often_as_stated, samples
 from synthetic_gases import TWO, gas
 from synthetic_run import drawn, write_run
@@ -75,16 +77,18 @@ def test_crater_sizes(tmp_path, names):
 
 def test_figures_and_films_have_scales_and_limits_of_their_data(tmp_path, rng):
     run = read_run(impact(tmp_path / "a.h5"))
-    figure = crater_figure.draw(run, crater.crater(run))
-    (bar,) = [axes for axes in figure.axes if axes.get_xlabel().startswith("displacement")]
+    figure = ricochet.analyse("crater", run).figure()
+    bars = [axes for axes in figure.axes if axes.get_xlabel().startswith("displacement")]
     film, _ = player.film(run, [0, 1], "displacement", [])
-    assert bar.get_xlim()[1] == pytest.approx(film["scales"]["displacement"][1])
+    tops = [bar.get_xlim()[1] for bar in bars]
+    assert tops == pytest.approx([film["scales"]["displacement"][1]] * 2)
     runs = [read_run(gas(tmp_path / "b.h5", rng, count=2))]
     for eta, z in ((0.05, 1.1), (0.6, 6.5)):
         ways = {
             f"Z_{name}{part}": z for name in ("virial", "rate", "walls") for part in ("", "_error")
         }
-        figure = equation_of_state.draw([{"packing": eta, "Z_reference": z, **ways}], runs)
+        rows = [{"packing": eta, "Z_reference": z, **ways}]
+        figure = equation_of_state.draw(Result(rows, [Group(eta, runs)])).figure()
         assert z < figure.axes[0].get_ylim()[1] < 1.3 * z
     plt.close("all")
 
@@ -120,9 +124,9 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
     alone = [impact(tmp_path / f"{m}_7.h5", mass=m, speed=7, xi=0.9 - m / 100) for m in (30, 40)]
     again = impact(tmp_path / "again.h5", mass=30, speed=7, xi=0.6, moved=4)
     paths = [*grid, *alone, again]
-    runs = distinct([read_run(path) for path in (*paths, grid[0])])
+    runs, warnings = distinct([read_run(path) for path in (*paths, grid[0])])
     assert len(runs) == len(paths)
-    assert f"left out, the same as another run: {grid[0]}" in capsys.readouterr().err
+    assert warnings == [f"left out, the same as another run: {grid[0]}"]
     points = [crater_scan.point(*one) for one in grouped(runs, crater_scan.key_of)]
     scans = crater_scan.scanned(points)
     assert [curve[0].values["speed"] for curve in scans["mass"]] == [2, 5]
@@ -135,7 +139,7 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
     assert crater_scan.fit_of("mass", slow, "displaced") is None, "two free points"
     three = crater_scan.fit_of("mass", [p._replace(free=True) for p in slow], "displaced")
     assert not three.missed, "two runs a point do not say how far they scatter"
-    figure = crater_scan.draw(runs, scans)
+    figure = ricochet.analyse("crater_scan", runs).figure()
     legends = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
     assert {"speed 2", "speed 5", "mass 5", "mass 10", "mass 15"} <= set(legends)
     title = figure.axes[0].get_title("left") + figure.axes[0].get_title()  # whatever the style

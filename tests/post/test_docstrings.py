@@ -32,6 +32,15 @@ HOT = {
     "stop.collisions_per_disk": 200,
 }
 ROUGH = {"contact.restitution": 0.9, "contact.tangential_restitution": 0.5}
+MIXED = {
+    "box": {"boundary": ("periodic", "periodic")},
+    "species": [
+        {"name": name, "count": 32, "packing_fraction": 0.05, "temperature": 1, "mass": mass}
+        for name, mass in (("light", 1), ("heavy", 4))
+    ],
+    "contact": {"restitution": 0.8},
+    "stop": {"collisions_per_disk": 12},
+}
 CRATER = """&species name = 'bed' count = 60 packing_fraction = 0.5 region = 0, 1, 0, 0.5 /
 &species name = 'projectile' relative_to = 'bed' mass = 25 radius = 2 position = 0.5, 0.8
   velocity = 0, -5 /
@@ -42,7 +51,7 @@ CRATER = """&species name = 'bed' count = 60 packing_fraction = 0.5 region = 0, 
 
 @pytest.fixture(scope="session")
 def names(request, tmp_path_factory):
-    """Return the objects that examples may use: `run`, `runs`, `cooling_runs`, `bed_run`."""
+    """Return the objects that examples may use: `run`, `runs`, `mixed_runs` and others."""
     patch = pytest.MonkeyPatch()
     patch.setenv("RICOCHET", str(request.getfixturevalue("program")))
     folder = tmp_path_factory.mktemp("examples")
@@ -63,6 +72,7 @@ def names(request, tmp_path_factory):
         "heated_runs": [made("hot", GAS, **HOT)],
         "rough_runs": [made(f"rough_{k}", GAS, **{"run.seed": k}, **ROUGH) for k in (1, 2)],
         "small": {"species": {"count": 20, "radius": 0.01, "speed": 1}, "stop": {"collisions": 20}},
+        "mixed_runs": [made(f"mixed_{k}", MIXED, **{"run.seed": k}) for k in (1, 2)],
         "has_xarray": bool(find_spec("xarray")),
         "has_gsd": bool(find_spec("gsd")),
         "has_mdanalysis": bool(find_spec("MDAnalysis")),

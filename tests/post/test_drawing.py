@@ -9,7 +9,7 @@ from matplotlib import colors
 import trajectory
 from ricochet import RunError, read_run
 from ricochet.figures.drawing import COLOURS, STYLE, caption, plt, with_images
-from ricochet.script import chosen_frames, frame_list
+from ricochet.reports.options import chosen_frames, frame_list
 from synthetic_gases import cooled, falling, gas
 from synthetic_run import ROOT, drawn, run_script, written
 

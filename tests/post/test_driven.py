@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-import driven
-import energy
+import ricochet
 import trajectory
-from driven import demon_law, fuller, noise_law, temperature_law
-from ricochet import statistics, theory
+from ricochet import driven, statistics, theory
+from ricochet.analysis.driven import demon_law, fuller, noise_law, temperature_law
 from ricochet.figures.drawing import plt
 from ricochet.reading.nature import Refused
+from ricochet.reports.equilibrium.driven import by_input
 from sampling import STATISTICS, samples
 from synthetic_run import drawn
 
@@ -26,7 +26,7 @@ def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
         **{"d": "drive.strength=2", "e": "contact.restitution=0.8"},
     }
     runs = [simulated(text, change, name=name) for name, change in changes.items()]
-    groups = driven.by_input(runs)
+    groups = dict(by_input(runs))
     found = [[run.path.stem for run in group] for group in groups.values()]
     assert found == [["a", "b"], ["c"], ["d"], ["e"]]
     assert list(groups)[1] == "ξ = 0.9, bottom velocity = 0.2, drive strength = 1"
@@ -96,7 +96,8 @@ def test_energy_is_kept_as_its_balance_says(simulated, tmp_path):
 def test_single_points_are_seen_and_titles_lie_over_no_words_of_a_wall(simulated):
     top = "&side name = 'top' temperature = 2 /"
     run = simulated(f"{top} &species count = 2 radius = 0.1 temperature = 1 / &stop time = 1 /")
-    curves = [line for axes in energy.draw([run]).axes for line in axes.lines]
+    axes_of_energy = ricochet.analyse("energy", run).figure().axes
+    curves = [line for axes in axes_of_energy for line in axes.lines]
     single = [line for line in curves if len(line.get_xdata()) == 1 and line.get_alpha() is None]
     assert [line.get_marker() for line in single] == ["o", "o"]
     figure, axes = plt.subplots(figsize=(5.2, 5.7))

@@ -7,8 +7,8 @@ import pytest
 from matplotlib.collections import QuadMesh
 from scipy.stats import binom
 
-import fields as fields_script
 from gas_inputs import PERIODIC
+import ricochet
 from ricochet import RunError, estimates, fields, hard_disks as hd, statistics, thermodynamics as td
 from synthetic_run import ROOT, drawn, run_script, written
 
@@ -59,6 +59,7 @@ def test_fields_of_few_values_have_no_bias_and_their_errors_hold(tmp_path, rng, 
     assert np.mean(held) == pytest.approx(0.68, abs=5 * 0.47 / np.sqrt(np.size(held)))
 
 
+@pytest.mark.statistics
 def test_errors_of_a_flow_of_bounded_displacements_are_its_scatter(tmp_path, rng):
     """A part of each velocity is the change of a bounded displacement between two frames."""
     place = np.broadcast_to(rng.uniform(0.1, 0.9, (40, 2)), (160, 40, 2))
@@ -91,8 +92,7 @@ def test_a_map_of_a_round_container_is_drawn_in_it(tmp_path, rng):
     place = rng.uniform(0.3, 0.7, (16, 9, 2))
     v, held = rng.normal(size=place.shape), [((0.5, 0.5), 0.5, 1)]
     run = written(tmp_path / "a.h5", place, v, obstacles=held)
-    found = fields.fields([run], None, (2, 2)).found
-    axes = fields_script.draw_grid([run], (2, 2), found, None, "").axes[0]
+    axes = ricochet.analyse("fields", run, grid=(2, 2)).figure().axes[0]
     (shown,) = (one for one in axes.collections if isinstance(one, QuadMesh))
     assert shown.get_clip_path() and axes.patches[-1].zorder < shown.zorder
 
@@ -180,7 +180,7 @@ def test_a_profile_and_a_map_are_drawn_with_their_numbers(simulated, tmp_path, c
     assert "warning: no profile agrees with these fluxes" in capsys.readouterr().err
 
 
-def test_the_oscillation_of_a_bed_is_told_apart_from_heat(tmp_path, rng, capsys, monkeypatch):
+def test_the_oscillation_of_a_bed_is_told_apart_from_heat(tmp_path, rng, capsys):
     """The mean velocity along y oscillates with an amplitude of 2, and kT is 1."""
     place = rng.uniform(0.1, 0.9, (300, 60, 2))
     v = rng.normal(size=place.shape)
@@ -188,17 +188,11 @@ def test_the_oscillation_of_a_bed_is_told_apart_from_heat(tmp_path, rng, capsys,
     v[..., 1] += 2 * np.sin(0.7 * np.arange(300))[:, None]
     kinds = {"species": np.repeat([1, 2], 30), "names": ("grain", "other")}
     bed = written(tmp_path / "bed.h5", place, v, radius=0.01, **kinds).path
-    shown: list = []
-    monkeypatch.setattr(
-        fields_script, "report", lambda args, figure, *_, **__: shown.append(figure)
-    )
-    for path, words in ((calm, []), (bed, ["--species", "grain"])):
-        assert run_script("fields", path, "--across", "y", "-o", tmp_path / "a.png", *words) == 0
+    given = ((calm, {}), (bed, {"species": "grain"}))
+    shown = [ricochet.analyse("fields", path, across="y", **more).figure() for path, more in given]
     labels = [figure.axes[2].get_legend_handles_labels()[1] for figure in shown]
     assert labels == [["measured"], ["kT", "$kT_x$", "$kT_y$"]]
     assert "fields of the species 'grain' (30 disks)" in shown[1].get_suptitle()
-    monkeypatch.undo()
-    capsys.readouterr()
     drawn(tmp_path, "fields", calm)
     assert capsys.readouterr().err == ""
     drawn(tmp_path, "fields", bed, "--species", "grain")

@@ -7,9 +7,10 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.quiver import Quiver, QuiverKey
 from scipy.signal import lfilter
 
-import cooling as cooling_figure
-import fields as fields_figure
-import missed as missed_figure
+import ricochet
+from ricochet.reports.grains import cooling as cooling_figure
+from ricochet.reports.equilibrium import fields as fields_figure
+from ricochet.reports.equilibrium import missed as missed_figure
 from ricochet import (
     crater,
     drawing,
@@ -97,7 +98,8 @@ def test_cooling_has_a_linear_panel_for_each_restitution(tmp_path, rng, figures)
         assert np.ptp(band) > np.ptp(axes.lines[1].get_ydata()), "a single run has a band"
     assert first.get_ylabel() == "mean energy per disk (J)" and first.get_xlabel() == "time (s)"
     assert overview.get_yscale() == "log"
-    assert "estimated" in first.get_legend().get_title().get_text()
+    said = " ".join(text.get_text() for text in figure.texts)
+    assert "estimated" in said and "standard errors" not in said
 
 
 def test_the_table_of_cooling_has_both_values_after_the_same_number_of_collisions(tmp_path, rng):
@@ -107,8 +109,10 @@ def test_the_table_of_cooling_has_both_values_after_the_same_number_of_collision
         draws = rng.exponential(size=(5, 30))
         draws *= 30 * (1 - 0.1 * np.arange(5)[:, None] / 4) / draws.sum(axis=1)[:, None]
         runs.append(read_run(mixture(tmp_path / f"{k}.h5", draws, tau=tau, cooled=0.1)))
-    groups = cooling_figure.by_restitution(runs)
-    (row,) = cooling_figure.table(groups, [cooling_figure.energies(runs)])
+    found = ricochet.analyse("cooling", runs)
+    (row,) = found.table
+    few = "Bands in the first row and of the temperature ratio: 95 % of single runs, estimated."
+    assert found.notes == [f"{few} Other bands: standard errors of the mean over the runs."]
     assert row["energy_left"] == pytest.approx((0.9 + 0.95) / 2, abs=1e-6)
 
 
@@ -162,6 +166,16 @@ def test_a_bed_that_is_large_enough_keeps_the_crater_from_the_box(simulated, rng
             )
             hits = crater.crater(run).side_collisions
             assert crater.box_takes_part(run, hits) == taken, (mass, xi, share, hits)
+
+
+def test_the_titles_of_the_panels_of_a_crater_are_below_the_title_of_the_figure(simulated):
+    run = simulated(ROOT / "input/crater.nml", "species.bed.count=200")
+    figure = ricochet.analyse("crater", run).figure()
+    figure.draw_without_rendering()
+    titles = [axes._left_title for axes in figure.axes if axes._left_title.get_text()]
+    assert len(titles) == 3 and figure._suptitle is not None
+    bottom = figure._suptitle.get_window_extent().y0
+    assert all(one.get_window_extent().y1 < bottom for one in titles)
 
 
 # --- where equilibrium begins ---
@@ -241,7 +255,7 @@ def test_the_coefficient_of_speeds_is_explained_beside_its_band(tmp_path, rng, f
     path, small = maxwellian(tmp_path / "gas.h5", rng), maxwellian(tmp_path / "b.h5", rng, count=50)
     assert run_script("speeds", path, "-o", tmp_path / "a.png") == 0
     assert run_script("speeds", path, small, "-o", tmp_path / "a.png") == 0
-    assert "0 for Maxwell's speeds" in figures[0].axes[3].texts[0].get_text()
+    assert "0 for Maxwell's speeds" in " ".join(text.get_text() for text in figures[0].texts)
     for figure, ends in zip(figures, ({400: ""}, {50: ", N = 50", 400: ", N = 400"}), strict=True):
         labels = figure.axes[3].get_legend_handles_labels()
         shown = dict(zip(*labels[::-1], strict=True))
@@ -423,6 +437,14 @@ def test_arrows_are_as_long_as_the_largest_flow_beyond_its_error(tmp_path, rng):
     assert pale.get_alpha() < dark.get_alpha() == 1 and flow.significant.sum() == dark.N
     assert 0.2 / dark.scale == pytest.approx(0.1), "the length of a cell"
     plt.close(figure)
+
+
+def test_fields_of_a_run_that_is_too_short_say_that_they_have_no_errors(tmp_path, rng, capsys):
+    for frames, known in ((6, False), (60, True)):
+        x, v = rng.uniform(0, 1, (frames, 40, 2)), rng.normal(size=(frames, 40, 2))
+        path = write_run(tmp_path / f"{frames}.h5", x, v)
+        assert run_script("fields", path, "--grid", "2,2", "-o", tmp_path / "a.png") == 0
+        assert ("no errors: the steady state" in capsys.readouterr().err) is not known
 
 
 # --- one run ---

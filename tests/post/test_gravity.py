@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-import equipartition
-import gravity
-import missed
-from ricochet import RunError, read_run, statistics, thermodynamics
+from ricochet.reports.equilibrium import equipartition
+from ricochet.reports.equilibrium import gravity
+from ricochet.reports.equilibrium import missed
+from ricochet import RunError, estimates, read_run, statistics, thermodynamics
 from sampling import held_as_often_as_stated, samples
 from synthetic_gases import TWO, falling
 from synthetic_run import drawn
@@ -97,7 +97,7 @@ def test_thermalisation_time_ignores_a_passing_agreement():
 
     def found(difference, error):
         known = statistics.Estimate(np.abs(difference), np.full(8, error))
-        return statistics.propagate_error(lambda curve: equipartition.entry(time, curve), known)
+        return estimates.propagate_error(lambda curve: equipartition.entry(time, curve), known)
 
     assert found(gap, 0.005) == pytest.approx((3 + 0.1 / 0.11, 0.005 / 0.11))  # for a steep line
     for unknown in (found(gap + 1, 0.04), found(gap, 0.06), found(gap, np.nan)):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from ricochet import hard_disks as hd, theory
+from ricochet import hard_disks as hd, mixtures, theory
 from ricochet.predictions.theory import path_density
-from validation.laws import cooling_ratio, mixture_rates
+from ricochet.mixtures import cooling_ratio
+from validation.laws import mixture_rates
 
 
 def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_points():
@@ -64,7 +65,8 @@ def test_the_pressure_of_many_sizes_is_that_of_their_contacts():
     """Z = 1 + pi / 2 n sum x_i x_j s_ij^2 chi_ij, and the limit of equal disks is correct."""
     s, n = np.array([0.01, 0.02, 0.04]), np.array([300, 200, 50])
     eta, pair = np.pi / 4 * n @ s**2, (s[:, None] + s) / 2
-    z = 1 + np.pi / 2 * n @ (pair**2 * hd.contact_values(hd.simulated(eta), n, s)) @ n / n.sum()
+    chi = mixtures.contact_values(hd.simulated(eta), n, s)
+    z = 1 + np.pi / 2 * n @ (pair**2 * chi) @ n / n.sum()
     alike = (n @ s) ** 2 / (n @ s**2) / n.sum()
     assert z == pytest.approx(hd.of_sizes(hd.simulated(eta), eta, alike))
     assert hd.of_sizes(hd.simulated(eta), eta, 1) == hd.simulated(eta)
@@ -100,20 +102,25 @@ def test_a_mixture_flows_as_one_gas_if_its_disks_are_equal_and_however_its_speci
     """Results scale with the units; stress of few heavy disks decays twice as fast as velocity."""
     eta, z, names = 0.3, float(hd.henderson(0.3)), ("viscosity", "bulk_viscosity")
     n, size, mass = 4 * eta / np.pi * np.array([0.2, 0.3, 0.5]), np.ones(3), np.ones(3)
-    equal, one = hd.enskog_mixture(z, n, size, mass), hd.enskog(z, eta, 1.0)
+    equal, one = mixtures.enskog_mixture(z, n, size, mass), hd.enskog(z, eta, 1.0)
     assert [equal[name] for name in names] == pytest.approx([one[name] for name in names], rel=1e-5)
     assert equal["memory"] * hd.collision_rate(z, 1.0, 1e6) == pytest.approx(1, rel=1e-5)
     size, mass, n = np.array([1.0, 2.0, 1.0]), np.array([1.0, 9.0, 1.0]), n / 3
-    cut = hd.enskog_mixture(z, n, size, mass)
-    whole = hd.enskog_mixture(z, np.array([n[0] + n[2], n[1]]), size[:2], mass[:2])
-    other = hd.enskog_mixture(z, n / 4, 2 * size, 3 * mass, 5.0)
+    cut = mixtures.enskog_mixture(z, n, size, mass)
+    whole = mixtures.enskog_mixture(z, np.array([n[0] + n[2], n[1]]), size[:2], mass[:2])
+    other = mixtures.enskog_mixture(z, n / 4, 2 * size, 3 * mass, 5.0)
     for name in names:
         assert cut[name] == pytest.approx(whole[name])
         assert other[name] == pytest.approx(np.sqrt(3 * 5) / 2 * cut[name])
     assert other["memory"] == pytest.approx(2 * np.sqrt(3 / 5) * cut["memory"])
+    np.testing.assert_allclose(mixtures.self_diffusion(z, n, np.ones(3), np.ones(3)), one["D"])
+    pair = mixtures.self_diffusion(z, np.array([n.sum(), 0]), size[:2], mass[:2])
+    chi = mixtures.contact_values(z, np.array([n.sum(), 0]), size[:2])[0, 1]
+    friction = 2 * n.sum() * 1.5 * chi * np.sqrt(2 * np.pi * 0.9)  # of a disk of mass 9
+    assert pair[1] == pytest.approx(1 / friction)
     few, mass = eta * np.array([1, 1e-5]), np.array([1.0, 1e5])
     alone, heavy = (
-        hd.enskog_mixture(z, few[:k], np.ones(k), mass[:k])["viscosity"] for k in (1, 2)
+        mixtures.enskog_mixture(z, few[:k], np.ones(k), mass[:k])["viscosity"] for k in (1, 2)
     )
     rate = 2 * np.sqrt(2 * np.pi) * eta * hd.contact_value(z, np.pi / 4 * eta) / mass[1]
     assert heavy - alone == pytest.approx(1.022 * few[1] / (2 * rate), rel=0.01)

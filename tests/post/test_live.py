@@ -43,11 +43,12 @@ def live(started, tmp_path):
 def opened(browser, address):
     """Return the browser with the page and its film."""
     browser.open(address)
-    wait_for(lambda: browser.run("return live.stamp !== ''"))
+    browser.until("return live.stamp !== ''")
     return browser
 
 
 def test_the_film_keeps_up_with_the_run_until_one_goes_elsewhere(live, browser):
+    """This takes 5 to 10 s, because the run is made into a film again for each request."""
     run, _, address = live
     assert address.startswith("http://127.0.0.1:")
     opened(browser, address)

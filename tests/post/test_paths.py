@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ricochet.analysis.paths import seen, turns_between, why_unknown
+from ricochet.reading.paths import seen, turns_between, why_unknown
 
 SHAPES = """&obstacle name = 'post' centre = 1, 0.4 radius = 0.15 /
 &wall name = 'ramp' from = 0.2, 0.2 to = 0.5, 0.4 /

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from synthetic_run import written
 
-import equation_of_state
+from ricochet.reports.equilibrium import equation_of_state
+from ricochet.reports.groups import Group
+from ricochet.reports.result import Result
 import ricochet
 from ricochet import RunError, hard_disks
 
@@ -130,7 +132,7 @@ def test_the_curve_of_a_mixture_ends_before_equal_disks_freeze(tmp_path):
     run = written(tmp_path / "a.h5", x, x, radius=0.01 * radius)
     ways = {f"Z_{name}{end}": 20.0 for name in equation_of_state.WAYS for end in ("", "_error")}
     rows = [{"packing": 0.78, "Z_reference": None, **ways}]
-    above, below = equation_of_state.draw(rows, [run]).axes
+    above, below = equation_of_state.draw(Result(rows, [Group(0.78, [run])])).figure().axes
     henderson, published = (line.get_xydata() for line in above.lines[:2])
     assert henderson[-1, 0] == pytest.approx(0.78)
     known = published[np.isfinite(published[:, 1]), 0]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-import correlations
-import rates
+from ricochet.reports.equilibrium import correlations
+from ricochet.reports.equilibrium import rates
 from ricochet import EventLog, read_run, thermodynamics as td, transport as tp
 from synthetic_run import drawn, written
 

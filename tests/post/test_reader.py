@@ -309,7 +309,8 @@ ENDINGS = {"animate": "gif", "export": "xyz", "player": "html"}
 def test_running_simulations_are_drawn(started, tmp_path, system, capsys):
     """The simulation is suspended while the scripts read its file, and has not finished.
 
-    All scripts that a system allows draw their figures.
+    All scripts that a system allows draw their figures.  The first and the fifth system use 5 to
+    9 s, because nine and five scripts draw them.
     """
     texts, scripts = RUNNING[system]
     parts = []

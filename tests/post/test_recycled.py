@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-import discharge
 import player
+import ricochet
 import trajectory
 from ricochet import ProgramError, RunError, Simulation, read_run, statistics
 from ricochet.analysis.correlations import Correlator
 from ricochet.reading.nature import Refused
+from ricochet.reports.grains import discharge
 from synthetic_run import run_script, write_run
 
 HOPPER = """&box upper = 1, 2 gravity = 0, -1 boundary = '{}', 'wall' /
@@ -115,8 +116,10 @@ def test_the_rate_of_a_hopper_follows_the_law_that_it_has(tmp_path, capsys):
     assert y == pytest.approx(0.7 * (x - 1.4) ** 1.5, rel=1e-6)
     found = discharge.fitted(x, y)
     assert [one[0] for one in found.values()] == pytest.approx([0.7, 1.4, 1.5], rel=1e-5)
+    (fit,) = ricochet.analyse("discharge", paths).further[0]
+    assert fit["k"] == pytest.approx(1.4, rel=1e-5)
     assert run_script("discharge", *paths, "-o", tmp_path / "rate.png") == 0
-    assert "k = 1.4000" in capsys.readouterr().out
+    assert " 1.4 " in capsys.readouterr().out.splitlines()[-2]
 
 
 @pytest.mark.parametrize("widths", [3, 4])
@@ -146,7 +149,7 @@ def test_a_rate_of_drawn_radii_has_the_error_of_their_scatter(tmp_path):
     assert row["W_error"] / row["W"] == pytest.approx(0.1 * statistics.student(3) / 3**0.5)
     assert found.complete and found.independent == [3]
     single = discharge.measured_rates(runs[:1], 4)
-    assert not single.complete and "samples of radii" in single.notes[0]
+    assert not single.complete and "samples of radii" in single.warnings[0]
     alike = [read_run(mouths(tmp_path / "alike", (0.2,), k=1.4, c=1.0)[0])]
     assert discharge.measured_rates(alike, 4).complete
 
@@ -154,12 +157,11 @@ def test_a_rate_of_drawn_radii_has_the_error_of_their_scatter(tmp_path):
 def test_the_rate_of_one_mouth_is_drawn_against_time(tmp_path):
     """The lines at the rate and at the number of disks meet the measured curves at the end."""
     runs = [read_run(path) for path in mouths(tmp_path, (0.2,), k=1.4, c=0.7)]
-    rows = discharge.measured_rates(runs, 4).rows
-    figure = discharge.draw_in_time(rows[0], runs, 4)
-    left, right = figure.axes
+    result = ricochet.analyse("discharge", runs)
+    left, right = result.figure().axes
     measured, line, *_ = left.lines
     assert line.get_ydata()[-1] == pytest.approx(measured.get_ydata()[-1])
-    assert right.lines[1].get_ydata() == pytest.approx(2 * [rows[0]["W"]])
+    assert right.lines[1].get_ydata() == pytest.approx(2 * [result.table[0]["W"]])
 
 
 def test_what_is_no_refilled_hopper_is_refused(run, tmp_path):

@@ -78,6 +78,7 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
             {"seed": 2, "cadence": "frames_every_collisions = 64"},
             {"correlations": "set output.frames_every_time"},
         ),
+        ({"count": 32}, {"correlations": "analyse them separately"}),
         (ROUND | MIXED, {"mixture": "conserves angular momentum"}),
         (APART, {"mixture": "have not collided"}),
         (MIXED | {"count": 1, "packing": MIXED["packing"].replace("9", "1")}, {"mixture": "three"}),

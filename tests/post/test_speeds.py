@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-import mixture
+from ricochet.reports.equilibrium import mixture
 from ricochet import RunError, read_run, script, speed_laws, speeds, thermodynamics
 from ricochet.figures.drawing import plt
 from sampling import held_as_often_as_stated, samples

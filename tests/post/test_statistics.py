@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from ricochet import statistics, theory
+from ricochet import estimates, statistics, theory
 from ricochet.analysis import cooling
 from ricochet.predictions.hard_disks import haff_rate
 
@@ -48,7 +48,7 @@ def test_excess_kurtosis_and_its_noise(rng):
     gases = np.sqrt(rng.exponential(size=(2000, 500)))
     found = [statistics.excess_kurtosis(speed) for speed in gases]
     assert np.mean(found) == pytest.approx(0, abs=0.01)
-    assert np.std(found) == pytest.approx(statistics.kurtosis_noise(500), rel=0.1)
+    assert np.std(found) == pytest.approx(estimates.kurtosis_noise(500), rel=0.1)
 
 
 # --- independent values ---
@@ -59,7 +59,7 @@ def test_errors_of_a_histogram_are_its_scatter(rng, copies):
     """The values are independent, or groups of four are equal."""
     bins = np.linspace(0, 1, 6)
     draws = np.repeat(rng.beta(2, 3, (4000, 100)), copies, axis=1)
-    heights = [statistics.binned(values, bins, independent=100) for values in draws]
+    heights = [estimates.binned(values, bins, independent=100) for values in draws]
     assert np.sum(heights[0].mean) / 5 == pytest.approx(1)
     scatter = np.std([height.mean for height in heights], axis=0)
     error2 = np.mean([height.error**2 for height in heights], axis=0)
@@ -204,8 +204,8 @@ def test_windows_are_means():
 def test_a_propagated_error_belongs_to_the_value_at_the_mean():
     """The middle of the two limits would be biased for a curved function; no limit, no value."""
     curve = statistics.Estimate(np.array([1.0, 2.0]), np.array([0.1, 0.5]))
-    assert statistics.propagate_error(lambda y: y[1] ** 2, curve) == pytest.approx((4.0, 2.0))
-    known = statistics.propagate_error(lambda y: y[1] if y[1] > 1.8 else np.nan, curve)
+    assert estimates.propagate_error(lambda y: y[1] ** 2, curve) == pytest.approx((4.0, 2.0))
+    known = estimates.propagate_error(lambda y: y[1] if y[1] > 1.8 else np.nan, curve)
     assert np.isnan(known.mean) and np.isnan(known.error)
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import scipy
 
-import correlations
+import ricochet
+from ricochet.reports.equilibrium import correlations
 import snapshot
 from ricochet import (
     RunError,
@@ -15,6 +16,7 @@ from ricochet import (
     correlations as pairs,
     estimates,
     hard_disks as hd,
+    statistics,
     structure,
     transport,
 )
@@ -192,19 +194,26 @@ def flights(rng, count, time):
 
 @pytest.mark.parametrize(("step", "lag"), [(0.4, 8), (1.0, 4), (2.0, 2), (5.0, 2)])
 def test_memory_and_diffusion_are_right_however_far_apart_frames_are(tmp_path, rng, step, lag):
-    """The unit is the mean free time; displacements and slopes of each flight are exact."""
+    """The unit is the mean free time; displacements and slopes of each flight are exact.
+
+    The disks of the second species are twice as fast.
+    """
     count, time = 1000, step * np.arange(1200)
-    x, v = flights(rng, count, time)
+    species = np.arange(count) % 2 + 1
+    x, v = (species[:, None] * of for of in flights(rng, count, time))
     image = np.floor(x).astype(int)
-    sides = {"image": image, "time": time, "periodic": PERIODIC}
+    sides = {"image": image, "time": time, "periodic": PERIODIC, "species": species}
+    sides["names"] = "slow", "fast"
     run = written(tmp_path / "run.h5", x - image, v, **sides)
     early, late = np.exp(-step * np.array([lag // 2, lag]))
     expected = 1 - (early - late) / (step * (lag - lag // 2))
-    for found in transport.diffusion(run, slice(None), lag):
-        assert found.mean == pytest.approx(expected * (1 - 1 / count), abs=4 * found.error)
-        assert found.error < 0.006
+    found = transport.diffusion(run, slice(None), lag, *run.names)
+    for square, both in zip((2.5, 1, 4), found, strict=True):
+        for one in both:
+            assert one.mean == pytest.approx(square * expected * (1 - 1 / count), abs=4 * one.error)
+            assert one.error < 0.008 * square
     at = step * np.array([0, 1, 2, 4])
-    found = pairs.curves([pairs.Correlator(run, run.time, lags=at).follow(run)])["all"]
+    found = pairs.curves([pairs.Correlator(run, run.time, lags=at).follow(run)])[run.names[0]]
     np.testing.assert_allclose(found["diffusion"].y, 1 - np.exp(-at), atol=0.015)
     np.testing.assert_allclose(found["vacf"].y / found["vacf"].y[0], np.exp(-at), atol=0.015)
     far = 4 * (at - 1 + np.exp(-at))
@@ -304,6 +313,20 @@ MIXED = """&run seed = {seed} / &box boundary = 'periodic', 'periodic' /
 """
 
 
+def test_the_table_contains_the_diffusion_of_each_species(simulated, monkeypatch):
+    """The coefficient of all disks is the mean over the species."""
+    text = MIXED.format(seed=1, packing=0.2, until=0.8).replace("count = 150", "count = 50", 1)
+    run = simulated(text.replace("decades_from = 0.001 frames_per_decade = 5", ""))
+    orders = {name: [statistics.correlated_mean(np.ones(9))] for name in correlations.ORDERS}
+    monkeypatch.setattr(correlations, "structure", lambda *_: (orders, {}))
+    (row,) = ricochet.analyse("correlations", run, equilibration=0.0).table
+    for way in correlations.DIFFUSION:
+        parts = [row[f"{way}_a"] / 4, 3 / 4 * row[f"{way}_b"]]
+        assert row[way] == pytest.approx(sum(parts)) and row[f"{way}_b_error"] > 0
+        assert row[f"{way}_a"] != row[f"{way}_b"]
+    assert row["D_enskog"] is None and row["D_enskog_b"] > row["D_enskog_a"] > 0
+
+
 @pytest.mark.parametrize("side", ["periodic", "wall"])
 def test_what_is_found_on_the_fly_and_in_parts_is_that_of_the_file(simulated, tmp_path, side):
     """Results are bit-identical: in one pass, for a growing file, and after stop and resume."""
@@ -333,10 +356,8 @@ def test_the_figure_of_a_mixture_names_all_curves_and_marks_those_without_error(
     The structure is calculated for all pairs of species.
     """
     run = simulated(MIXED.format(seed=1, packing=0.2, until=0.6))
-    found = correlations.analysed([run], 0.0)
-    groups = [(0.4, [run])]
-    rows, _ = correlations.table(groups, [found])
-    figure = correlations.draw(groups, [found], rows, 6.28)
+    result = ricochet.analyse("correlations", run, equilibration=0.0, wavenumber=6.28)
+    found, figure = result.groups[0].values, result.figure()
     panels = {axes.get_ylabel(): axes for axes in figure.axes}
     for label, pieces in (("F_s", ["all", "a", "b"]), ("S(k)", ["all", "a, a", "a, b", "b, b"])):
         (axes,) = (own for text, own in panels.items() if label in text)

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy.special import ndtr, stdtr
 
-import melting
+from ricochet.reports.equilibrium import melting
+from ricochet.reports.groups import Group
+from ricochet.reports.result import Result
 from gas_inputs import PERIODIC
 from ricochet import equilibrium, estimates, hard_disks as hd, statistics, thermodynamics as td
 from ricochet.reading.nature import Refused, nature_of
@@ -99,10 +101,11 @@ def test_error_bars_are_counted_that_hold_the_truth(tmp_path, rng):
 def test_melting_has_a_curve_for_each_number_of_disks(tmp_path):
     """P* is 4 eta Z / pi."""
     run = steady(tmp_path / "equal.h5", PERIODIC)
-    (row,), _ = melting.table([run], None)
+    (row,), _ = melting.table([Group(100, [run])], None)
     kt = td.kt_at_start(run)
     assert row["P"] == pytest.approx((100 * kt + 300 / 2) * 0.02**2 / kt, rel=1e-5)
-    axes = melting.draw([row, {**row, "N": 400}], [run]).axes[0]
+    groups = [Group(100, [run], colour="blue"), Group(400, [run], colour="red")]
+    axes = melting.draw(Result([row, {**row, "N": 400}], groups)).figure().axes[0]
     assert {"N = 100", "N = 400"} < set(axes.get_legend_handles_labels()[1])
 
 

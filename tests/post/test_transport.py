@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-import driven
-import transport as transport_script
+from ricochet.reports.equilibrium import transport as transport_script
+from ricochet.reports.groups import Group
+from ricochet.reports.result import Result
 from gas_inputs import GAS, UNLIKE, USUAL
 from ricochet import (
     RunError,
+    driven,
     estimates,
     hard_disks as hd,
     thermodynamics as td,
@@ -131,14 +133,16 @@ def test_squares_allow_for_the_mean_growth_that_is_taken_away():
 
 
 @pytest.mark.parametrize("packings", [(0.3,), (0.1, 0.3, 0.5)])
-def test_neither_points_nor_the_legend_cover_other_points(packings):
+def test_neither_points_nor_the_legend_cover_other_points(monkeypatch, packings):
     """All coefficients have the same values and errors."""
     names = ("viscosity", "conductivity", "bulk_viscosity", "D")
     own = {"ratio": 1.0, "ratio_error": 0.05}
     rows = [{"what": name, "packing": eta, **own} for eta in packings for name in names]
     curve = estimates.Curve(*np.ones((3, 5)))
     found = {name: SimpleNamespace(curve=curve) for name in names}
-    figure = transport_script.draw([(eta, found) for eta in packings], rows)
+    groups = [Group(eta, [], found) for eta in packings]
+    monkeypatch.setattr(transport_script, "caption", lambda runs: "")
+    figure = transport_script.draw(Result(rows, groups)).figure()
     figure.draw_without_rendering()
     (axes,) = (one for one in figure.axes if "packing" in one.get_xlabel())
     at = np.sort(np.concatenate([part[0].get_xdata() for part in axes.containers]))

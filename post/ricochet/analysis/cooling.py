@@ -1,8 +1,7 @@
 """Cooling gases: energies averaged over runs, Haff's law, temperatures of rough disks.
 
-In this module, tau is the number of collisions per disk.  A dictionary of the type `Curves`
-contains the coordinates of points, as arrays, and the quantities measured at these points, as
-estimates with errors.
+tau is the number of collisions per disk. `Curves` contain coordinates of points, as arrays, and the
+quantities measured there, as estimates with errors.
 """
 
 from collections.abc import Sequence
@@ -22,31 +21,25 @@ from .thermodynamics import lightest_and_heaviest, packing
 __all__ = [
     "FlowShare",
     "energies",
-    "energy_left",
-    "exponent",
-    "first_rate",
-    "flow_notes",
     "flow_share",
-    "haff",
-    "rough",
-    "rough_law",
-    "soft_law",
-    "steady_ratio",
+    "temperature_ratio",
 ]
 
 Curves = dict[str, np.ndarray | Estimate]
 
 WINDOW = 2.0  # collisions per disk over which a cooling rate is averaged
-SLOW = 0.9  # a gas with a lower ratio to Haff's rate is not homogeneous
+SLOW = 0.9  # below this ratio to Haff's rate a gas is not homogeneous
 SMOOTH = (
     "inelastic",
     "soft_contacts",
     "mixture",
     "rotating",
 )  # traits of gases that cool by Haff's law
+NOT_COOLING = "it is not a freely cooling gas"
+COOLING = TRAITS.keys() - SOURCES - {"collapsed", "gravity"}  # traits of freely cooling gases
 TOGETHER = 25  # number of disks in a cell in which a common velocity is measured
 FLOWING = 0.05  # share of flows in the kinetic energy above which a gas is not homogeneous
-SETTLED = 0.005  # relative distance from its limit at which the ratio is regarded as steady
+SETTLED = 0.005  # relative distance from its limit at which the ratio counts as steady
 
 
 def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray, np.ndarray]:
@@ -69,15 +62,14 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     Returns
     -------
     dict of str to numpy.ndarray or Estimate
-        (points,) curves by name.  The energies "K_all" and "K_SPECIES", divided by the initial
-        energy of all disks, are functions of "collisions_per_disk".  The energies "energy_all" and
-        "energy_SPECIES" are functions of "time".  The curve "ratio" is the temperature of the
-        heaviest species divided by that of the lightest species
+        (points,) curves: "K_all" and "K_SPECIES", over the initial energy of all disks, at
+        "collisions_per_disk"; "energy_all" and "energy_SPECIES" at "time"; and "ratio", the
+        temperature of the heaviest over that of the lightest species
 
     Raises
     ------
     Refused
-        if a run is driven, or if disks are at rest at its start
+        if a run is driven, or disks are at rest at its start
 
     Examples
     --------
@@ -85,9 +77,9 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     >>> found["K_all"].mean.shape, bool(found["K_all"].mean[-1] < 0.1)
     ((201,), True)
     """
-    names, alone = ("all", *runs[0].names), TRAITS.keys() - SOURCES - {"collapsed", "gravity"}
+    names = ("all", *runs[0].names)
     for run in runs:
-        allow(run, "it is not a freely cooling gas", *alone)
+        allow(run, NOT_COOLING, *COOLING)
     energy = [np.array([moving_energy(run, name) for name in names]) for run in runs]
     first = np.mean([tracks[0, 0] for tracks in energy])
     left = [tracks / tracks[0, 0] for tracks in energy]
@@ -105,6 +97,48 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     return found
 
 
+def temperature_ratio(runs: Sequence[Run], first: float, last: float) -> Estimate:
+    """Average the ratio of the temperatures of two species over a part of each run.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        (R,) runs of one cooling mixture, which differ by their seed
+    first, last : float
+        ends of the part in collisions per disk; a run that ends earlier is used up to its end
+
+    Returns
+    -------
+    Estimate
+        temperature of the heaviest over that of the lightest species, averaged over collisions per
+        disk and over the runs
+
+    Raises
+    ------
+    Refused
+        if all species have the same mass, or a run is driven
+    RunError
+        if a run has fewer than `first` collisions per disk
+
+    Examples
+    --------
+    >>> bool(cooling.temperature_ratio(mixed_runs, 5, 10).mean > 0)
+    True
+    """
+    light, heavy = (runs[0].names[k] for k in lightest_and_heaviest(runs[0]))
+    ratios = []
+    for run in runs:
+        allow(run, NOT_COOLING, *COOLING)
+        tau = run.collisions_per_disk.value
+        if tau[-1] <= first:
+            raise RunError(f"{run.path}: ends after {tau[-1]:.3g} collisions per disk")
+        ratio = moving_energy(run, heavy) / moving_energy(run, light)
+        part = np.append(tau[(tau > first) & (tau < last)], min(last, tau[-1]))
+        part = np.insert(part, 0, first)
+        ratios.append(np.trapezoid(np.interp(part, tau, ratio), part) / (part[-1] - first))
+    return estimate(ratios)
+
+
 def moving_energy(run: Run, name: str = "all") -> np.ndarray:
     """Return the samples (T,) of the kinetic energy per disk; the first sample must not be 0."""
     energy = run.observable(f"{name}/kinetic_energy").value
@@ -120,7 +154,7 @@ class FlowShare(NamedTuple):
     """Share of the kinetic energy of a gas that belongs to flows."""
 
     share: float  # 0 on average for independent velocities, as in a homogeneous gas
-    p: float  # probability of larger velocities of cells if the velocities are independent
+    p: float  # p-value of independent velocities
 
     @property
     def homogeneous(self) -> bool:
@@ -131,23 +165,22 @@ class FlowShare(NamedTuple):
 def flow_share(runs: Sequence[Run], frame: int = -1) -> FlowShare:
     """Measure the share of flows in the kinetic energy of cooling gases.
 
-    A cooling gas does not stay homogeneous: neighbouring disks begin to move in parallel.  The box
-    is divided into cells of about 25 disks (`TOGETHER`).  If the velocities of the disks are
-    independent, the squared momentum of a cell is on average the sum of the squared momenta of its
-    disks.  The excess, divided by twice the mass of the cell, is the kinetic energy of a flow.
+    In a gas that is no longer homogeneous, neighbouring disks move in parallel. If velocities are
+    independent, the squared momentum of a cell of about 25 disks (`TOGETHER`) is on average the sum
+    of the squared momenta of its disks. Any excess over twice the mass of the cell is energy of a
+    flow.
 
     Parameters
     ----------
     runs : sequence of Run
         (R,) runs of one input, which differ by their seed
     frame : int
-        index of the frame [the last frame]
+        index of the frame
 
     Returns
     -------
     FlowShare
-        the share in all runs together, and the p-value of independent velocities; the share is NaN
-        if frames do not contain velocities
+        share over all runs together and p-value of independent velocities; NaN without velocities
 
     Examples
     --------
@@ -164,10 +197,10 @@ def flow_share(runs: Sequence[Run], frame: int = -1) -> FlowShare:
 
 
 def cell_sums(run: Run, frame: int) -> tuple[float, float, float, float]:
-    """Return sums over the cells of a frame of a run.
+    """Return four sums over the cells of a frame.
 
-    The sums are the kinetic energy of flows, the total kinetic energy, the squared momenta of cells
-    in units of the variance of a component, and the number of the components.
+    They are the kinetic energy of flows, the total kinetic energy, the squared momenta of cells in
+    units of the variance of a component, and the number of these components.
     """
     momentum = run.mass[:, None] * (run.velocity[frame] - drift(run))
     side = np.sqrt(run.edges.prod() * TOGETHER / run.n_disks)
@@ -183,23 +216,7 @@ def cell_sums(run: Run, frame: int) -> tuple[float, float, float, float]:
 
 
 def flow_notes(groups: Sequence[tuple[str, Sequence[Run]]]) -> list[str]:
-    """Return a note for each named group of cooling gases that are not homogeneous at their end.
-
-    Parameters
-    ----------
-    groups : sequence of tuple
-        (G,) name and runs of each group
-
-    Returns
-    -------
-    list of str
-        the notes
-
-    Examples
-    --------
-    >>> cooling.flow_notes([("all", cooling_runs[:0])])
-    []
-    """
+    """Return a note for each named group of gases that are not homogeneous at their end."""
     notes = []
     for name, runs in groups:
         found = flow_share(cooled) if (cooled := [r for r in runs if r.nature.cooling]) else None
@@ -216,30 +233,10 @@ def flow_notes(groups: Sequence[tuple[str, Sequence[Run]]]) -> list[str]:
 
 
 def first_rate(run: Run) -> float:
-    """Return the initial collision rate w0 of a gas of cooling disks.
+    """Return the initial collision rate w0 [1/time] of cooling smooth disks in a periodic box.
 
-    For equal disks, w0 follows from the equation of state, and for mixtures from counted
-    collisions.
-
-    Parameters
-    ----------
-    run : ricochet.Run
-        a run of smooth disks that cool in a periodic box
-
-    Returns
-    -------
-    float
-        initial collision rate w0 [1/time]
-
-    Raises
-    ------
-    Refused
-        if Haff's law does not apply to the run
-
-    Examples
-    --------
-    >>> bool(cooling.first_rate(cooling_runs[0]) > 0)
-    True
+    w0 follows from the equation of state for equal disks, and from counted collisions for mixtures.
+    Refused is raised if Haff's law does not apply.
     """
     law = "Haff's law is for smooth disks that only cool, in a periodic box"
     allow(run, law, *SMOOTH)
@@ -263,24 +260,9 @@ def counted_rate(run: Run) -> float:
 
 
 def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the kinetic energy of a cooling gas at the times of observables.
+    """Return w0 t, collisions per disk and energy over its initial value, each (T,), at samples.
 
-    Parameters
-    ----------
-    run : ricochet.Run
-        a run of smooth disks that cool in a periodic box
-
-    Returns
-    -------
-    w0_t, tau, k : numpy.ndarray
-        (T,) time in units of the initial mean free time, collisions per disk, and energy divided by
-        the initial energy
-
-    Examples
-    --------
-    >>> w0_t, tau, k = cooling.energy_left(cooling_runs[0])
-    >>> float(k[0]), bool(k[-1] < 0.1)
-    (1.0, True)
+    w0 is the initial collision rate. Refused is raised if Haff's law does not apply to the run.
     """
     time, tau = run.collisions_per_disk
     energy = moving_energy(run)
@@ -288,23 +270,9 @@ def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def soft_law(runs: list[Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return the cooling law of disks with velocity-dependent restitution.
+    """Return the cooling law for a velocity-dependent restitution, or None if it is constant.
 
-    Parameters
-    ----------
-    runs : list of Run
-        (R,) runs with the same law of restitution
-
-    Returns
-    -------
-    tuple of numpy.ndarray or None
-        time times the initial collision rate, collisions per disk, and energy divided by the
-        initial energy, or None if the restitution is constant
-
-    Examples
-    --------
-    >>> cooling.soft_law(cooling_runs) is None
-    True
+    The law is an array each of w0 t, collisions per disk, and energy over its initial value.
     """
     if "soft_contacts" not in runs[0].nature:
         return None
@@ -320,36 +288,10 @@ def haff(
 ) -> tuple[Curves, Estimate, float, Estimate]:
     """Compare the cooling of runs that have equal coefficients of restitution with Haff's law.
 
-    Parameters
-    ----------
-    tracks : list of tuple
-        (R,) result of `energy_left` for each run
-    xi : float
-        restitution
-    soft : tuple, optional
-        result of `soft_law` for the runs
-    points : int
-        number of points of each curve
-
-    Returns
-    -------
-    curves : dict of str to numpy.ndarray or Estimate
-        (points,) energy divided by the initial energy as a function of time and of collisions per
-        disk, the predictions for both functions, and the cooling rate
-    rate : ricochet.statistics.Estimate
-        the cooling rate per collision or, if `soft` is given, the exponent of the decay in time
-    end : float
-        number of collisions per disk at which the homogeneous state ends, or NaN if the homogeneous
-        state lasts until the end of the run
-    end_error : ricochet.statistics.Estimate
-        the number `end`, with its error
-
-    Examples
-    --------
-    >>> tracks = [cooling.energy_left(one) for one in cooling_runs]
-    >>> _, rate, *_ = cooling.haff(tracks, 0.9)
-    >>> bool(abs(rate.mean / hard_disks.haff_rate(0.9) - 1) < 0.3)
-    True
+    `tracks` are results of `energy_left`, and `soft` that of `soft_law`. Returned are curves
+    (points,) of the energy, its predictions and the cooling rate; the cooling rate per collision
+    or, with `soft`, the exponent of the decay in time; the collisions per disk at the end of the
+    homogeneous state, NaN if it lasts; and the same number with its error.
     """
     time = np.geomspace(max(t[1] for t, *_ in tracks), min(t[-1] for t, *_ in tracks), points)
     tau, by_tau = on_grid([c for _, c, _ in tracks], [(k, np.log(k)) for *_, k in tracks], points)
@@ -389,33 +331,18 @@ def haff(
 
 
 def exponent(time: np.ndarray, energy: np.ndarray) -> float:
-    """Fit the exponent p of K ~ t^-p in the last decade of time.
+    """Fit p of K ~ t^-p in the last decade of times (T,) with equal ratios.
 
-    Parameters
-    ----------
-    time, energy : numpy.ndarray
-        (T,) points of the curve, at times with equal ratios
-
-    Returns
-    -------
-    float
-        the exponent p, which is 2 for Haff's law and 5/3 for viscoelastic disks
-
-    Examples
-    --------
-    >>> time = np.geomspace(1, 100, 50)
-    >>> round(cooling.exponent(time, time**-2.0), 6)
-    2.0
+    It is 2 by Haff's law and 5/3 for viscoelastic disks.
     """
     late = time >= time[-1] / 10
     return float(-np.polyfit(np.log(time[late]), np.log(energy[late]), 1)[0])
 
 
 def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray) -> float:
-    """Return the number of collisions per disk after which a gas is no longer homogeneous, or NaN.
+    """Return the collisions per disk after which a gas is no longer homogeneous, or NaN.
 
-    A gas is regarded as no longer homogeneous if its cooling rate stays below `SLOW` times the
-    predicted rate `law` until the end of the run.
+    From then on, the cooling rate stays below `SLOW` times the rate predicted by the `law`.
     """
     slow = rate < SLOW * law
     if not slow[-1]:
@@ -427,27 +354,9 @@ def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray
 
 
 def rough_law(run: Run) -> tuple[float, float, float]:
-    """Return the contact parameters of rough disks; raise an error if the theory does not apply.
+    """Return normal and tangential restitution, and moment of inertia over m r^2, of rough disks.
 
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-
-    Returns
-    -------
-    tuple of float
-        normal and tangential restitution, and moment of inertia divided by m r^2
-
-    Raises
-    ------
-    Refused
-        if the theory of cooling rough disks does not apply to the run
-
-    Examples
-    --------
-    >>> cooling.rough_law(rough_runs[0])
-    (0.9, 0.5, 0.5)
+    Refused is raised if the theory of cooling rough disks does not apply to the run.
     """
     law = "the laws are for equal rough disks that cool in a periodic box, without contact.friction"
     allow(run, law, "inelastic", "rough", "rotating")
@@ -469,24 +378,8 @@ def temperatures(run: Run) -> tuple[np.ndarray, np.ndarray]:
 def rough(runs: list[Run], points: int = 200) -> Curves:
     """Average the temperatures of cooling rough disks over runs that differ by their seed.
 
-    Parameters
-    ----------
-    runs : list of Run
-        (R,) runs of rough disks
-    points : int
-        number of points of each curve
-
-    Returns
-    -------
-    dict of str to numpy.ndarray or Estimate
-        (points,) translational temperature "T", rotational temperature "T_rot" and their "ratio",
-        as functions of "collisions_per_disk"
-
-    Examples
-    --------
-    >>> found = cooling.rough(rough_runs, points=11)
-    >>> found["T"].mean.shape
-    (11,)
+    The curves (points,) are translational "T", rotational "T_rot" and their "ratio", at
+    "collisions_per_disk".
     """
     own = [run.collisions_per_disk.value for run in runs]
     tau, both = on_grid(own, [temperatures(run) for run in runs], points)
@@ -496,25 +389,9 @@ def rough(runs: list[Run], points: int = 200) -> Curves:
 
 
 def steady_ratio(runs: list[Run], law: tuple[float, float, float]) -> Estimate:
-    """Estimate the ratio of rotational to translational temperature at late times.
+    """Estimate the late, steady ratio of rotational to translational temperature.
 
-    Parameters
-    ----------
-    runs : list of Run
-        (R,) runs of rough disks that differ by their seed
-    law : tuple of float
-        result of `rough_law` for the runs
-
-    Returns
-    -------
-    Estimate
-        the mean ratio after the time at which the theoretical ratio is steady
-
-    Examples
-    --------
-    >>> ratio = cooling.steady_ratio(rough_runs, cooling.rough_law(rough_runs[0]))
-    >>> bool(0 < ratio.mean < 2)
-    True
+    `law` is the result of `rough_law`, with which the theoretical ratio is calculated.
     """
     ratios = []
     for run in runs:

@@ -1,38 +1,20 @@
 """Time correlation functions of displacements, velocities and densities for each species.
 
-    from ricochet import correlations, read_run
-    found = correlations.measured([read_run("runs/glass.h5")], waves=[5.2], skip=0)
-    found["small"]["msd"]                # a Curve: lags x, means y, errors
+    from ricochet import correlations, read_run found =
+    correlations.measured([read_run("runs/glass.h5")], waves=[5.2], skip=0) found["small"]["msd"]
+    # a Curve: lags x, means y, errors
 
-Each correlation function is a mean over pairs of samples at times t0 and t, as a function of the
-lag t - t0, for one species or for "all" disks.  If r is the displacement of a disk from t0 to t,
-the correlation functions are defined as follows:
+Each function is an average over pairs of samples at t0 and t, as a function of the lag t - t0, for
+one species or for "all" disks. With the displacement r of a disk from t0 to t:
 
-    msd        <r^2>, the mean square displacement
-    vacf       <v(t0) v(t)>, the velocity autocorrelation; the mean square speed at lag 0
-    diffusion  <v(t0) r> / 2, half the integral of vacf; not for driven disks
-    alpha2     <r^4> / (2 <r^2>^2) - 1, the non-Gaussian parameter: 0 where r is Gaussian
-    overlap    fraction of the disks with r < `reach` [0.3 mean diameters]
+    msd        <r^2>, the mean square displacement vacf       <v(t0) v(t)>, the velocity
+    autocorrelation; the mean square speed at lag 0 diffusion  <v(t0) r> / 2, half the integral of
+    vacf; not for driven disks alpha2     <r^4> / (2 <r^2>^2) - 1, the non-Gaussian parameter: 0
+    where r is Gaussian overlap    fraction of the disks with r < `reach` [0.3 mean diameters]
     F_s(k)     <J0(k r)>, the mean of exp(i k r) over all directions, for each k of `waves`
 
-Along axes where the velocity of the centre of mass is conserved, or changed only by noise
-(drive.keep_momentum = .false.), displacements and velocities are relative to the centre of mass.
-
-Lags are spaced logarithmically: each power of ten is divided into twelve intervals, and from each
-interval the lag with the largest number of pairs of samples is used.  An interval whose lag has few
-pairs compared with a shorter lag is left out, because its noise would hide the course of the
-function.  This choice of lags suits samples at equal intervals, samples at logarithmic intervals,
-samples in bursts, and combinations of these schedules.  For a given lag, each sample at a time t0
-is used as an origin if there is also a sample at t0 plus the lag.  If the sums over all origins
-would take too long, time is divided into intervals of one sixteenth of the lag, and only the first
-sample in each interval is an origin.  If fewer samples are origins, the correlations of
-displacements are equally accurate, but the correlations of velocities are less accurate at lags of
-many mean free times.  The method is the multiple-tau correlator of Ramirez et al., Journal of
-Chemical Physics 133, 154103 (2010), but without means over neighbouring samples, so that each lag
-is exact.
-
-Errors follow from the scatter of the runs.  For a single run, errors follow from the scatter of
-sixteen parts of the run.  Lags above an eighth of the duration of a single run have no error (NaN).
+The choice of lags and origins and the errors are explained in docs/explanation/statistics.md, "Time
+correlations".
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -41,10 +23,12 @@ from typing import Any, Self
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
+from tqdm import tqdm
 
 from ..reading.files import RunError
 from ..reading.nature import KICKED, TRAITS, allow
 from ..reading.reader import Run
+from ..reading.results import CHUNK
 from ..running.simulation import Simulation
 from .estimates import Curve, Estimate, estimate
 from .statistics import FEWEST, correlated_mean
@@ -53,50 +37,29 @@ from .equilibrium import conserved_momentum, later, refuse_others
 __all__ = [
     "Correlator",
     "bursts",
-    "correlators",
     "curves",
-    "lags_of",
     "measured",
 ]
 
 PER_DECADE = 12
-FEW_PAIRS = 0.125  # smallest number of pairs of a lag divided by that of a shorter lag
+FEW_PAIRS = 0.125  # smallest number of pairs at a lag, relative to that at a shorter lag
 ORIGINS = 16  # origins per lag if not every sample is an origin
 BLOCKS = 16  # blocks of time, for errors
 REACH = 0.3  # mean diameters
-CLOSE = 1e-9  # relative difference of lags that are regarded as equal
+CLOSE = 1e-9  # relative difference of lags that count as equal
 MOST_PAIRS = 2 * 10**6  # largest number of pairs whose lags are compared
+PATIENCE = 5.0  # time after which a terminal shows the progress [s]
 MOST_DISKS = 10**8  # largest number of disks in pairs of samples, if every sample is an origin
-CHUNK = 10**6  # largest number of disks in frames that are read together
 FLOWING = {"sheared", "sliding_surfaces", "recycled", "changed"}
 FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
 
 
 def lags_of(times: np.ndarray) -> np.ndarray:
-    """Return the lags for which correlations of samples at given times are computed.
+    """Return lags (L,) [time] for samples at increasing times (T,): 0, and twelve per power of ten.
 
-    Parameters
-    ----------
-    times : numpy.ndarray
-        (T,) times of the samples in increasing order
-
-    Returns
-    -------
-    numpy.ndarray
-        (L,) lags [time]: 0, and the most frequent lag in each interval of a twelfth of a power of
-        ten; an interval is left out if its lag has less than an eighth of the pairs of a shorter
-        lag, apart from the decrease in proportion to the rest of the duration
-
-    Raises
-    ------
-    ValueError
-        if there are fewer than two times, or if they do not increase
-
-    Examples
-    --------
-    >>> lags = lags_of(np.arange(100.0))
-    >>> float(lags[0]), float(lags[1]), float(lags[-1]) <= 99
-    (0.0, 1.0, True)
+    From each interval the lag with the most pairs of samples is taken. It is left out if it has
+    less than an eighth of the pairs of a shorter lag, apart from the decrease with the remaining
+    duration. ValueError is raised for fewer than two times, or times that do not increase.
     """
     if len(times) < 2 or not (np.diff(times) > 0).all():
         raise ValueError("lags require at least two times in increasing order")
@@ -118,27 +81,26 @@ def lags_of(times: np.ndarray) -> np.ndarray:
 def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
     """Return sampling times in bursts, which contain many pairs of samples at every lag.
 
-    Each burst consists of samples at logarithmically spaced times after its start, with ten samples
-    per power of ten from `first` to `last`.
+    Each burst has samples at logarithmically spaced times after its start, ten per power of ten.
 
     Parameters
     ----------
     first, last : float
-        the shortest and the longest time after the start of a burst [time]
+        shortest and longest time after the start of a burst [time]
     apart : float
-        time from the start of one burst to the start of the next burst
+        time between the starts of bursts [time]
     until : float
         latest possible time of a sample [time]
 
     Returns
     -------
     numpy.ndarray
-        (T,) times in increasing order, which start at 0
+        (T,) increasing times, which start at 0
 
     Raises
     ------
     ValueError
-        if the arguments do not satisfy 0 < first <= last <= until and apart > 0
+        unless 0 < first <= last <= until and apart > 0
 
     Examples
     --------
@@ -157,9 +119,8 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
 class Correlator:
     """Time correlations of a run or a simulation, accumulated from samples one after the other.
 
-    The required memory is bounded, because a sample is stored only until all its pairs have been
-    added.  In long runs, about 16 samples are stored for each lag.  A pickled correlator contains
-    its complete state, so that a measurement can be continued exactly.
+    Only samples with pairs still to come are stored, about 16 per lag in long runs. A pickled
+    correlator contains its complete state, so that a measurement can be continued exactly.
     """
 
     def __init__(
@@ -170,7 +131,7 @@ class Correlator:
         reach: float | None = None,
         lags: np.ndarray | None = None,
     ):
-        """Set all sums to zero; by default, the lags are those that `lags_of` selects."""
+        """Set all sums to zero; by default, the lags are those selected by `lags_of`."""
         cools = {"inelastic"} if source.nature.cooling else set()
         what = "time correlations require a steady state without flow"
         allow(source, what, *TRAITS.keys() - FLOWING - cools)
@@ -189,28 +150,27 @@ class Correlator:
         self.pairs = np.zeros(size)
         self.sums = np.zeros((*size, len(self.names), len(FIXED) + len(self.waves)))
         self.done = 0  # samples
-        self.held: dict[
-            int, tuple[np.ndarray, np.ndarray, int]
-        ] = {}  # by sample: position, velocity, last partner
+        self.held: dict[int, np.ndarray] = {}  # by sample: x, y, vx, vy (4, N)
+        self.ends: dict[int, list[int]] = {}  # by sample: origins whose last partner it is
         self.due: dict[int, list[tuple[int, int]]] = {}  # by sample: (origin, lag)
         self.last = np.full(len(self.lags), -1.0)  # slot of its last origin
 
     def follow(self, source: Run | Simulation) -> Self:
-        """Add the samples after the last added sample, from a run or a simulation.
+        """Add the samples that follow the last added one, also of a run that has grown since.
 
-        If `source` is an unfinished run, `follow` can be called again after the run has written
-        more samples.  If `source` is a simulation, `follow` advances the simulation to the times of
-        the samples.
+        A simulation is advanced to the times of the samples.
         """
-        for place, velocity in samples(source, self.times[self.done :]):
+        times = self.times[self.done :]
+        look = {"delay": PATIENCE, "disable": None, "leave": False, "unit": "frame"}
+        for place, velocity in tqdm(samples(source, times), total=len(times), **look):
             self.add(place, velocity)
         return self
 
     def add(self, place: np.ndarray, velocity: np.ndarray) -> None:
-        """Add a sample: positions (N, 2), not wrapped into the box, and velocities (N, 2)."""
-        place, velocity = (
-            values - self.kept * np.average(values, axis=0, weights=self.mass)
-            for values in (place, velocity)
+        """Add a sample: unwrapped positions (N, 2) and velocities (N, 2)."""
+        share = self.mass / self.mass.sum()
+        state = np.concatenate(
+            [(values - self.kept * (share @ values)).T for values in (place, velocity)]
         )
         now, time = self.done, self.times[self.done]
         close = CLOSE * self.lags + 4 * np.spacing(self.times[-1]) * (self.lags > 0)
@@ -223,28 +183,38 @@ class Correlator:
         for lag in fresh.tolist():
             self.due.setdefault(int(partner[lag]), []).append((now, lag))
         if len(fresh):
-            self.held[now] = place, velocity, partner[fresh].max()
+            self.held[now] = state
+            self.ends.setdefault(int(partner[fresh].max()), []).append(now)
         if now in self.due:
             origins, lags = np.transpose(self.due.pop(now))
-            self.count(origins, lags, place, velocity)
-        self.held = {k: one for k, one in self.held.items() if one[2] > now}
+            self.count(origins, lags, state)
+        for origin in self.ends.pop(now, []):
+            del self.held[origin]
         self.done += 1
 
-    def count(
-        self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray
-    ) -> None:
-        """Add P pairs at the lags `lags`; each contains an earlier and the present sample."""
-        before, v0 = (np.stack([self.held[k][part] for k in origins]) for part in (0, 1))
-        way = place - before
-        square, half = np.einsum("pna,pna->pn", way, way), np.einsum("pna,pna->pn", v0, way) / 2
-        memory = np.einsum("pna,na->pn", v0, v)
-        values = [square, square**2, memory, half, square < self.reach**2]
-        values += [scipy.special.j0(k * np.sqrt(square)) for k in self.waves]
+    def count(self, origins: np.ndarray, lags: np.ndarray, state: np.ndarray) -> None:
+        """Add P pairs, each of an earlier and the present sample, at the lags `lags`."""
+        values = np.empty((len(FIXED) + len(self.waves), len(origins), state.shape[1]))
+        for k, origin in enumerate(origins):
+            self.evaluate(self.held[origin], state, values[:, k])
+        for wave, one in zip(self.waves, values[len(FIXED) :], strict=True):
+            scipy.special.j0(wave * np.sqrt(values[0]), out=one)
         span = self.times[-1] - self.times[0]
         share = (self.times[origins] - self.times[0]) / span
         where = lags, np.minimum((BLOCKS * share).astype(int), BLOCKS - 1)
         np.add.at(self.pairs, where, 1)
-        np.add.at(self.sums, where, np.moveaxis(np.array(values) @ self.shares, 0, 2))
+        np.add.at(self.sums, where, np.moveaxis(values @ self.shares, 0, 2))
+
+    def evaluate(self, before: np.ndarray, now: np.ndarray, values: np.ndarray) -> None:
+        """Write the `FIXED` amounts of each disk, for two samples (4, N), to `values` (F, N)."""
+        square, fourth, memory, half, overlap = values[: len(FIXED)]
+        x, y = now[:2] - before[:2]
+        vx, vy = before[2:]
+        np.add(x * x, y * y, out=square)
+        np.multiply(square, square, out=fourth)
+        np.add(vx * now[2], vy * now[3], out=memory)
+        np.multiply(0.5, vx * x + vy * y, out=half)
+        np.less(square, self.reach**2, out=overlap)
 
     def amounts(self, name: str, species: int) -> np.ndarray:
         """Return sums (L, B) at L lags over the pairs that start in each of B blocks of time."""
@@ -264,10 +234,9 @@ class Correlator:
 
 
 def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield positions, which are not wrapped into the box, and velocities at the given times.
+    """Yield unwrapped positions and velocities at the given times, or up to the end of a run.
 
-    If `source` is a simulation, the generator advances the simulation to the given times.  If
-    `source` is a run, the generator ends after the last frame.
+    A simulation is advanced to the given times.
     """
     if isinstance(source, Simulation):
         box = source.parameters["box"]
@@ -301,7 +270,7 @@ def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.nda
 
 
 def curves(members: Sequence[Correlator]) -> dict[str, dict[str, Curve]]:
-    """Return the correlation functions measured by several correlators, by species and by name.
+    """Return the correlation functions measured by several correlators.
 
     Parameters
     ----------
@@ -311,7 +280,7 @@ def curves(members: Sequence[Correlator]) -> dict[str, dict[str, Curve]]:
     Returns
     -------
     dict of str to dict of str to Curve
-        the functions by species, including "all", and by name; the module docstring lists the names
+        functions by species, including "all", and by name, as listed at the top of this module
 
     Examples
     --------
@@ -336,35 +305,11 @@ def correlators(
     reach: float | None = None,
     skip: float | None = None,
 ) -> list[Correlator]:
-    """Measure the correlations of each run in its steady state, at the lags of the first run.
+    """Return a correlator of each run in its steady state, with the lags of the first run.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        (R,) runs of the same disks
-    waves : iterable of float
-        wavenumbers of F_s(k, t) [1/length]
-    reach : float, optional
-        displacement below which a disk counts as overlapping with its earlier position [0.3 mean
-        diameters]
-    skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
-
-    Returns
-    -------
-    list of Correlator
-        (R,) a correlator for each run
-
-    Raises
-    ------
-    RunError
-        if a run has too few frames, or no lag in common with the first run
-
-    Examples
-    --------
-    >>> one, *others = correlators(runs, skip=10)
-    >>> len(one.lags) > 10, len(others)
-    (True, 2)
+    `waves` are wavenumbers of F_s(k, t) [1/length], and `reach` is the displacement below which a
+    disk overlaps with its earlier position [0.3 mean diameters]. RunError is raised if a run has
+    too few frames, or no lag in common with the first run.
     """
     refuse_others(runs)
     times = [run.time[later(run, skip)] for run in runs]
@@ -389,13 +334,18 @@ def measured(runs: Sequence[Run], **options: Any) -> dict[str, dict[str, Curve]]
     runs : sequence of Run
         (R,) runs of the same disks
     **options : object
-        `waves`, `reach` and `skip` as for `correlators`
+        `waves`, wavenumbers k [1/length]; `reach`, the displacement below which disks overlap [0.3
+        mean diameters]; `skip`, collisions per disk that are left out [until no observable drifts]
 
     Returns
     -------
     dict of str to dict of str to Curve
-        the functions by species, including "all", and by name; x of a curve contains the lags, and
-        y contains the means over pairs of samples
+        functions by species, including "all", and by name, as listed at the top of this module
+
+    Raises
+    ------
+    RunError
+        if a run has too few frames, or no lag in common with the first run
 
     Examples
     --------

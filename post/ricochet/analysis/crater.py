@@ -1,8 +1,7 @@
 """Craters: identify projectile and bed, and measure the size of the crater.
 
-The projectile is the disk of the species 'projectile'. If the input contains no species
-'projectile', the projectile is the only disk that moves at the start.  All disks except the
-projectile form the bed.
+The projectile is the disk of the species 'projectile' or, without such a species, the only disk
+that moves at the start. All other disks form the bed.
 """
 
 from typing import Any, NamedTuple
@@ -17,24 +16,18 @@ from ..reading.reader import Run
 
 __all__ = [
     "Crater",
-    "bed",
-    "box_takes_part",
     "crater",
-    "displaced",
-    "ended_by_time",
-    "energy_fraction",
-    "enough_disks",
     "hole",
     "projectile",
 ]
 
 
 class Crater(NamedTuple):
-    """The size of a crater according to several definitions, and the end of the run."""
+    """The size of a crater by several definitions, and the end of the run."""
 
     hit: int
     displaced: int
-    width: float  # extent of the first positions of the displaced disks
+    width: float  # extent of the initial positions of the displaced disks
     depth: float
     hole_width: float
     hole_depth: float
@@ -44,8 +37,7 @@ class Crater(NamedTuple):
     side_collisions: int
 
 
-# Properties (traits of `nature`) that a run with a crater may have, because they do not set the bed
-# in motion.
+# Traits of `nature` that a run with a crater may have, because they do not set the bed in motion.
 QUIET: tuple[str, ...]
 QUIET = (
     "inelastic",
@@ -60,103 +52,35 @@ QUIET = (
 QUIET += ("time_stepped",)
 FEW_HITS = 0.01  # wall collisions per disk up to which the box has no influence
 HIT_OVER_LEAST = 3.4  # number of disks hit, divided by M (1/f - 1) / (1 - xi^2)
-BED_OVER_HIT = 2.2  # ratio of the disks of a sufficiently large bed to the disks hit
+# number of disks of a sufficiently large bed, divided by the number of disks hit
+BED_OVER_HIT = 2.2
 
 
 def energy_fraction(run: Run) -> float:
-    """Return the fraction of the initial energy at which the run ends according to the input.
-
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-
-    Returns
-    -------
-    float
-        value of the variable `stop.energy_fraction`
-
-    Examples
-    --------
-    >>> energy_fraction(bed_run)
-    0.1
-    """
+    """Return `stop.energy_fraction`, the fraction of the initial energy at which the run ends."""
     return float(run.parameter("stop", "energy_fraction", 0.1))
 
 
 def ended_by_time(run: Run, size: Crater) -> bool:
-    """Determine whether the energy left at the end exceeds the fraction `stop.energy_fraction`.
-
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-    size : ricochet.crater.Crater
-        result of `crater` for the run
-
-    Returns
-    -------
-    bool
-        whether the energy left, divided by the initial energy, exceeds `stop.energy_fraction`
-
-    Examples
-    --------
-    >>> ended_by_time(bed_run, crater.crater(bed_run))
-    False
-    """
+    """Return whether the energy left at the end exceeds `stop.energy_fraction`."""
     return size.energy_left > energy_fraction(run) * (1 + 1e-9)
 
 
 def box_takes_part(run: Run, side_collisions: float) -> bool:
-    """Determine whether so many disks hit the sides that the crater depends on the box.
+    """Return whether more collisions with the sides than one per hundred disks affect the crater.
 
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-    side_collisions : float
-        number of collisions with the sides; it may be a mean over runs
-
-    Returns
-    -------
-    bool
-        whether the number of collisions with the sides exceeds one per hundred disks
-
-    Examples
-    --------
-    >>> box_takes_part(bed_run, 0)
-    False
+    `side_collisions` may be a mean over runs.
     """
     return side_collisions > FEW_HITS * run.n_disks
 
 
 def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> float:
-    """Estimate the number of disks for which the crater does not reach the sides of the box.
+    """Estimate the number of disks with which the crater does not reach the sides of the box.
 
-    In a sufficiently large bed, about n = 3.4 M (1/f - 1) / (1 - xi^2) disks are hit.  A bed is
-    sufficiently large if it contains 2.2 n disks.  The factors 3.4 and 2.2 were measured for beds
-    in the lower half of a square box, at a packing fraction of 0.5.  The factors were measured for
-    mass ratios M between 10 and 50, restitutions xi between 0.3 and 0.8, ratios of the radii
-    between 2 and 10, and the energy fraction f = 0.1.
-
-    Parameters
-    ----------
-    mass_ratio : float
-        M, mass of the projectile divided by the mass of a bed disk
-    restitution : float
-        xi, below 1
-    fraction : float
-        f, fraction of the initial energy at which the run ends
-
-    Returns
-    -------
-    float
-        number of disks; infinite if disks are elastic or `fraction` is 0
-
-    Examples
-    --------
-    >>> round(enough_disks(25, 0.5, 0.1))
-    2244
+    A large bed has about 3.4 M (1/f - 1) / (1 - xi^2) hit disks, and 2.2 times as many suffice.
+    Both factors were measured in a square box half filled at a packing fraction of 0.5, with M from
+    10 to 50, xi from 0.3 to 0.8, ratios of radii from 2 to 10 and f = 0.1. The number is infinite
+    for xi = 1 or f = 0.
     """
     if restitution >= 1 or fraction <= 0:
         return float("inf")
@@ -170,7 +94,7 @@ def projectile(run: Run) -> int:
     Parameters
     ----------
     run : ricochet.Run
-        a run with a species 'projectile', or with a single disk that moves at the start
+        a run of a crater
 
     Returns
     -------
@@ -180,7 +104,7 @@ def projectile(run: Run) -> int:
     Raises
     ------
     RunError
-        if no species is called 'projectile' and the number of disks that move at the start is not 1
+        if no species is called 'projectile', and not exactly one disk moves at the start
 
     Examples
     --------
@@ -198,48 +122,14 @@ def projectile(run: Run) -> int:
 
 
 def bed(run: Run) -> np.ndarray:
-    """Return a mask of the disks that belong to the bed.
-
-    Parameters
-    ----------
-    run : ricochet.Run
-        a run with a projectile
-
-    Returns
-    -------
-    numpy.ndarray
-        (N,) mask of all disks except the projectile
-
-    Examples
-    --------
-    >>> int(bed(bed_run).sum())
-    60
-    """
+    """Return a mask (N,) of all disks except the projectile."""
     mask = np.ones(run.n_disks, dtype=bool)
     mask[projectile(run)] = False
     return mask
 
 
 def displaced(run: Run, frame: int = -1) -> np.ndarray:
-    """Return a mask of the bed disks whose displacement is larger than their radius.
-
-    Parameters
-    ----------
-    run : ricochet.Run
-        a run with a projectile
-    frame : int
-        number of the frame [the last frame]
-
-    Returns
-    -------
-    numpy.ndarray
-        (N,) mask, which is true for displaced disks
-
-    Examples
-    --------
-    >>> displaced(bed_run).shape, int(displaced(bed_run, 0).sum())
-    ((61,), 0)
-    """
+    """Return a mask (N,) of the bed disks displaced by more than their radius in a frame."""
     return bed(run) & (run.displacement(frame) > run.radius)
 
 
@@ -254,7 +144,7 @@ def crater(run: Run) -> Crater:
     Returns
     -------
     Crater
-        the sizes according to several definitions, and the end of the run
+        sizes by several definitions, and the state at the end of the run
 
     Raises
     ------
@@ -290,20 +180,20 @@ def crater(run: Run) -> Crater:
 
 
 def hole(run: Run) -> np.ndarray:
-    """Return the outline of the hole that a projectile has made in the bed.
+    """Return the outline of the hole made by the projectile in the bed.
 
-    The hole is the largest region where the local packing fraction has fallen below half of the
-    initial median of the bed.
+    It is the largest region in which the local packing fraction is below half of its initial
+    median.
 
     Parameters
     ----------
     run : ricochet.Run
-        a run with a projectile
+        a run of a crater
 
     Returns
     -------
     numpy.ndarray
-        (P, 2) closed line [length]; empty if the bed has no hole
+        (P, 2) closed line [length], which is empty if the bed has no hole
 
     Examples
     --------

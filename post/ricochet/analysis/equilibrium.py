@@ -1,8 +1,7 @@
 """Steady states of runs, the thermal motion of disks, and kT as a function of time.
 
-The parameter `skip` of many functions is the duration of the equilibration, in collisions per disk;
-samples from the equilibration are left out.  If `skip` is None, the duration of the equilibration
-is determined from the data.
+In many functions `skip` is the duration of the equilibration in collisions per disk, whose samples
+are left out. If it is None, the duration is determined from the data.
 """
 
 from collections.abc import Sequence
@@ -13,26 +12,26 @@ from ..reading.arrays import Index, chosen
 from ..reading.files import RunError
 from ..reading.nature import KICKED, ROUNDING, SETTLED, Refused, allow
 from ..reading.reader import Run
+from ..reading.results import CHUNK
 from ..running.simulation import Simulation
 from .statistics import FEWEST, equilibration, statistical_inefficiency
 
 __all__ = [
     "frames_from",
-    "free_disks",
     "kt_at_start",
     "start_of_equilibrium",
     "start_of_steady_state",
 ]
 
-CLEAR = 3.0  # significant difference of two means, in units of its standard deviation
-ENOUGH = 50  # independent samples from which the variance of a mean is known
+CLEAR = 3.0  # difference of two means that counts as significant, in standard deviations
+ENOUGH = 50  # independent samples with which the variance of a mean is well known
 SPEEDS_FORGET = 15.0  # collisions per disk after which speeds are independent of the start
 ALONG_WALLS = {
     "thermal_walls",
     "rough",
     "rotating",
     "inelastic",
-}  # with these traits walls may change the momentum along them
+}  # traits with which walls may change the momentum along them
 
 
 def refuse_others(runs: Sequence[Run]) -> None:
@@ -43,7 +42,7 @@ def refuse_others(runs: Sequence[Run]) -> None:
 
 
 def all_settle(runs: Sequence[Run]) -> bool:
-    """Return whether the runs relax to equilibrium; raise an error if only some runs do so."""
+    """Return whether the runs relax to equilibrium; raise an error if only some of them do."""
     settled = [run.nature.in_equilibrium for run in runs]
     if any(settled) and not all(settled):
         one, other = runs[settled.index(False)], runs[settled.index(True)]
@@ -56,9 +55,8 @@ def all_settle(runs: Sequence[Run]) -> bool:
 def after_start(run: Run, skip: float | None = None) -> float:
     """Return the time after which `skip` collisions per disk have occurred.
 
-    By default, `skip` is 15 collisions per disk (`SPEEDS_FORGET`), but at most half of the number
-    of collisions per disk in the whole run.  If the run contains no collisions and `skip` is not
-    given, the returned time is half of the duration of the run.
+    The default is `SPEEDS_FORGET`, 15 collisions per disk, but at most half of those in the whole
+    run. Without collisions, the time is half the duration of the run unless `skip` is given.
     """
     time = np.union1d(run.time, run.collisions_per_disk.time)
     tau = run.collisions_per_disk_at(time)
@@ -73,21 +71,18 @@ def after_start(run: Run, skip: float | None = None) -> float:
 
 
 def start_of_steady_state(run: Run, skip: float | None = None) -> float:
-    """Return the time after which a run is in a steady state.
+    """Return the time after which collision rate and energies of the species no longer drift.
 
-    A run is regarded as steady after the time at which the collision rate and the energies of the
-    species stop drifting.  Drifts are found in the samples of the observables or, if there are few
-    samples, in the frames.  Unless `skip` is given, the first 15 collisions per disk
-    (`SPEEDS_FORGET`) are not part of the steady state, because the distribution of speeds relaxes
-    during these collisions.  In a run with fewer than 30 collisions per disk, the first half of the
-    collisions is excluded instead of the first 15 collisions per disk.
+    Unless `skip` is given, at least 15 collisions per disk (`SPEEDS_FORGET`) are left out, during
+    which the speeds relax, or the first half of a run with fewer than 30. Drifts are sought in the
+    samples of the observables or, if these are few, in the frames.
 
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
     skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
+        collisions per disk that are left out [until no observable drifts]
 
     Returns
     -------
@@ -104,7 +99,7 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
 
 
 def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
-    """Return the time after which a run is steady, and a text that explains this choice."""
+    """Return the time after which a run is steady, and an explanation of this choice."""
     forgets = f"{SPEEDS_FORGET:g} collisions per disk, the relaxation time of speeds"
     if skip is not None:
         return after_start(run, skip), f"--equilibration {skip:g}"
@@ -123,12 +118,11 @@ def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
 
 
 def relaxed_start(run: Run, skip: float | None = None) -> tuple[float, str]:
-    """Return the time after which a gas has relaxed, and a text that explains this choice.
+    """Return the time after which a gas has relaxed, and an explanation of this choice.
 
-    Unlike `explained_start`, the function leaves out only the first 15 collisions per disk
-    (`SPEEDS_FORGET`), unless an observable differs significantly before and after the time at which
-    it seems to stop drifting.  Noise alone makes `explained_start` leave out a tenth of a steady
-    run on average.
+    Only 15 collisions per disk (`SPEEDS_FORGET`) are left out, unless an observable differs
+    significantly before and after the time at which it seems to stop drifting. By noise alone,
+    `explained_start` leaves out a tenth of a steady run on average.
     """
     start, reason = explained_start(run, skip)
     time, series = examined(run)
@@ -145,9 +139,9 @@ def relaxed_start(run: Run, skip: float | None = None) -> tuple[float, str]:
 
 
 def has_changed(values: np.ndarray, first: int, end: int) -> bool:
-    """Return whether the mean of values[first:end] differs significantly from the mean of the rest.
+    """Return whether the mean of values[first:end] differs significantly from that of the rest.
 
-    If the rest contains too few independent samples for a test, the means count as different.
+    They also count as different if the rest has too few independent samples for a test.
     """
     before, after = values[first:end], values[end:]
     if len(before) == 0:
@@ -160,10 +154,7 @@ def has_changed(values: np.ndarray, first: int, end: int) -> bool:
 
 
 def examined(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return times (T,) and a dictionary with the series (T - 1,) that are tested for drifts.
-
-    If the run contains too few samples for a test of drifts, the returned dictionary is empty.
-    """
+    """Return times (T,) and the series (T - 1,) tested for drifts, if there are enough samples."""
     few = has_few_observables(run)
     time = run.time if few else run.collisions_per_disk.time
     if len(time) < 2 * FEWEST:
@@ -192,9 +183,9 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
     skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
+        collisions per disk that are left out [until no observable drifts]
 
     Returns
     -------
@@ -219,18 +210,18 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
 def frames_from(
     run: Run, start: float, apart: float = 0.0, frames: list[int] | None = None
 ) -> list[int]:
-    """Select frames after a given time with a minimum number of collisions between them.
+    """Select frames after a given time, with a minimum number of collisions between them.
 
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
     start : float
-        time of the first frame
+        earliest time of a frame
     apart : float
-        smallest number of collisions per disk between two selected frames
+        fewest collisions per disk between two selected frames
     frames : list of int, optional
-        frames from which to select [all frames]
+        frames from which to select [all]
 
     Returns
     -------
@@ -253,11 +244,7 @@ def frames_from(
 
 
 def later(run: Run, skip: float | None = None) -> slice:
-    """Return the frames in the steady state (see `start_of_steady_state`), except the last frame.
-
-    The last frame is left out, because the last interval between frames may differ from the other
-    intervals.
-    """
+    """Return the frames in the steady state, except the last, whose interval may differ."""
     first = int(np.searchsorted(run.time, start_of_steady_state(run, skip)))
     if run.n_frames - 1 - first < 2:
         raise RunError(f"{run.path}: needs more frames after the start")
@@ -268,18 +255,17 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 
 def motion_notes(runs: Sequence[Run]) -> list[str]:
-    """Return a note for figures if noise moves the centre of mass (motion is relative to it)."""
+    """Return a note for figures if noise moves the centre of mass, to which motion is relative."""
     walks = any("random_walk" in run.nature for run in runs)
     note = "noise moves the centre of mass (drive.keep_momentum): motion is measured relative to it"
     return [note] * walks
 
 
 def unforced(source: Run | Simulation) -> np.ndarray:
-    """Return a mask (2,) of the axes along which no force except noise changes the total momentum.
+    """Return a mask (2,) of the axes along which only noise changes the total momentum.
 
-    The function `unforced` neglects the tangential forces of walls.  Walls exert tangential forces
-    only in runs with a property (trait of `nature`) in `ALONG_WALLS`.  If noise moves the centre of
-    mass, and friction at walls may stop the motion of the centre of mass, an error is raised.
+    Tangential forces of walls (traits `ALONG_WALLS`) are neglected. RunError is raised if noise
+    moves the centre of mass and friction at walls may stop it.
     """
     box, nature = source.parameters.get("box", {}), source.nature
     if nature & (KICKED - {"noise_driven"}) or nature & {"obstacles", "changed"}:
@@ -293,11 +279,7 @@ def unforced(source: Run | Simulation) -> np.ndarray:
 
 
 def conserved_momentum(source: Run | Simulation) -> np.ndarray:
-    """Return a mask (2,) of the axes along which no force except noise changes the momentum.
-
-    Unlike the function `unforced`, the function `conserved_momentum` includes the tangential
-    forces that walls exert in runs with a property in `ALONG_WALLS`.
-    """
+    """Return a mask (2,) of the axes along which only noise, and no wall, changes the momentum."""
     walls = "walls" in source.nature and source.nature & ALONG_WALLS
     return unforced(source) & (not walls)
 
@@ -305,8 +287,7 @@ def conserved_momentum(source: Run | Simulation) -> np.ndarray:
 def comoving(run: Run) -> np.ndarray:
     """Return a mask (2,) of the axes along which motion is relative to the centre of mass.
 
-    The mask is true for an axis if the total momentum along the axis is conserved, or if only noise
-    changes the total momentum along the axis.
+    These are the axes along which the total momentum is conserved, or changed only by noise.
     """
     kept = unforced(run)
     if run.nature & ALONG_WALLS and "random_walk" not in run.nature:
@@ -318,9 +299,8 @@ def comoving(run: Run) -> np.ndarray:
 def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.ndarray:
     """Return the energies m v^2 / 2 (F, N) of the thermal motion of disks in the given frames.
 
-    The velocity v is relative to the shear flow.  Along the axes that the function `comoving`
-    returns, v is also relative to the centre of mass.  If `component` is 0 or 1, v is replaced by
-    its x or y component, respectively.
+    v is relative to the shear flow and, along the axes of `comoving`, to the centre of mass. If
+    `component` is 0 or 1, only the x or the y component of v is used.
     """
     frames = chosen(run.n_frames, frames)
     velocity = run.velocity[frames]
@@ -333,25 +313,9 @@ def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.
 
 
 def free_disks(run: Run) -> float:
-    """Return the effective number of disks: the total kinetic energy divided by kT.
+    """Return the effective number of disks, N - k / 2 if momentum is conserved along k axes.
 
-    For N disks, the effective number is N - k/2, where k is the number of axes along which motion
-    is measured relative to the centre of mass.
-
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-
-    Returns
-    -------
-    float
-        the effective number of disks
-
-    Examples
-    --------
-    >>> equilibrium.free_disks(run)
-    63.0
+    The total kinetic energy is this number times kT.
     """
     return float(run.n_disks - comoving(run).sum() / 2)
 
@@ -363,10 +327,7 @@ def drift(run: Run) -> np.ndarray:
 
 
 def kt_of(run: Run, energy: np.ndarray) -> np.ndarray:
-    """Convert total kinetic energies `energy`, an array of any shape, to kT.
-
-    The page docs/explanation/laws.md explains when to divide the energy by N and when by N - 1.
-    """
+    """Convert total kinetic energies, an array of any shape, to kT (docs/explanation/laws.md)."""
     return (energy - 0.5 * run.mass.sum() * np.sum(drift(run) ** 2)) / free_disks(run)
 
 
@@ -376,12 +337,12 @@ def kt_at_start(run: Run) -> float:
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
 
     Returns
     -------
     float
-        kT in the first frame
+        kT [energy]
 
     Examples
     --------
@@ -397,13 +358,14 @@ def has_few_observables(run: Run) -> bool:
 
 
 def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
-    """Return the source of a time series, "observables" or "frames", with its times and its kT.
+    """Return a time series of kT: its source ("observables" or "frames"), its times and its values.
 
-    The source is "frames" if the run contains few samples of the observables and more frames than
-    such samples.
+    The source is "frames" if there are few samples of the observables and more frames than that.
     """
     if not has_few_observables(run):
         time, energy = run.observable("all/kinetic_energy")
         return "observables", time, kt_of(run, run.n_disks * energy)
-    energy = np.array([run.kinetic_energy(k).sum() for k in range(run.n_frames)])
+    step = max(1, CHUNK // run.n_disks)
+    parts = [run.kinetic_energy(slice(k, k + step)) for k in range(0, run.n_frames, step)]
+    energy = np.concatenate([part.sum(axis=1) for part in parts])
     return "frames", run.time, kt_of(run, energy)

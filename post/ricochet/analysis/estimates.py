@@ -1,5 +1,6 @@
 """Means, densities and fits of independent values, with errors, and goodness-of-fit tests."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -15,22 +16,18 @@ __all__ = [
     "LawFit",
     "LawTest",
     "PowerLaw",
-    "binned",
     "estimate",
     "excess_kurtosis",
     "fit_law",
     "fit_power_law",
     "goodness_of_fit",
-    "kurtosis_noise",
-    "propagate_error",
     "rounded_to_error",
-    "student",
 ]
 
-FEWEST_RUNS = 4  # smallest number of runs whose scatter is used as a measured value
+FEWEST_RUNS = 4  # smallest number of runs whose scatter counts as measured
 UNLIKELY = 0.005  # probability below which a deviation is regarded as significant
-MANY = 1e12  # degrees of freedom of a known error
-ONE_SIGMA = float(scipy.special.ndtr(1))  # importing scipy.stats takes a second
+MANY = 1e12  # degrees of freedom of an exactly known error
+ONE_SIGMA = 0.5 * math.erfc(-math.sqrt(0.5))  # importing scipy.special takes a third of a second
 
 
 class Estimate(NamedTuple):
@@ -41,25 +38,25 @@ class Estimate(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """Curve that consists of P points (x, y), with the errors of y."""
+    """A curve of P points (x, y), with the errors of y."""
 
     x: np.ndarray
     y: np.ndarray
-    error: np.ndarray  # NaN without an error
+    error: np.ndarray  # NaN where there is no error
 
 
 class LawTest(NamedTuple):
     """Result of a test that compares a sample with a distribution."""
 
     n: int  # number of independent values
-    ks: float  # Kolmogorov-Smirnov distance, the largest between the two distribution functions
+    ks: float  # Kolmogorov-Smirnov distance: the largest between the two distribution functions
     ks_p: float  # probability of a larger distance by chance
     chi2: float  # per degree of freedom, bins of equal probability
     chi2_p: float
 
 
 class LawFit(NamedTuple):
-    """K parameters of a law that is fitted to points, with the errors of the parameters."""
+    """K parameters of a law fitted to points, with their errors."""
 
     values: np.ndarray  # (K,)
     errors: np.ndarray  # (K,) half the 68 % intervals
@@ -88,19 +85,18 @@ def goodness_of_fit(
     Parameters
     ----------
     sample : numpy.ndarray
-        (n,) the values
+        (n,) values
     cdf : callable
-        distribution function, which takes an array of values
+        distribution function, which takes an array
     bins : int
         number of bins of equal probability for the chi-square test
     independent : int, optional
-        number of independent values in the sample [the number of values]; a sample of correlated
-        values contains fewer independent values
+        effective number of independent values, if they are correlated [n]
 
     Returns
     -------
     LawTest
-        statistics of the Kolmogorov-Smirnov test and of the chi-square test, each with its p-value
+        both statistics with their p-values
 
     Examples
     --------
@@ -122,22 +118,9 @@ def goodness_of_fit(
 
 
 def student(samples: ArrayLike) -> Any:
-    """Return Student's factor t: half the 68 % interval of a mean, divided by its standard error.
+    """Return Student's factor t, half the 68 % interval of a mean over its standard error.
 
-    Parameters
-    ----------
-    samples : array_like
-        (...) numbers of independent samples from which mean and standard error were estimated
-
-    Returns
-    -------
-    float or numpy.ndarray
-        (...) the factor, which tends to 1 for many samples
-
-    Examples
-    --------
-    >>> round(float(student(4)), 3)
-    1.197
+    `samples` (...) are numbers of independent samples; t tends to 1 for many.
     """
     return scipy.special.stdtrit(np.clip(np.subtract(samples, 1.0), 1.0, MANY), ONE_SIGMA)
 
@@ -148,14 +131,14 @@ def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
     Parameters
     ----------
     values : array_like
-        (..., R, ...) the values of R runs
+        (..., R, ...) values of R runs
     axis : int
         axis of the runs
 
     Returns
     -------
     Estimate
-        (...) mean, and half its 68 % interval from Student's t; the error of a single value is NaN
+        (...) mean, and half its 68 % interval by Student's t; NaN for a single value
 
     Examples
     --------
@@ -171,57 +154,74 @@ def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
 
 
 def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estimate:
-    """Propagate the error of a curve to a number that is derived from the curve.
+    """Propagate the error of a curve (P,) to a number `of(curve)`, such as the time of a crossing.
 
-    Parameters
-    ----------
-    of : callable
-        function that returns a number for a curve (P,), such as the time at which the curve crosses
-        a level
-    curve : ricochet.estimates.Estimate
-        (P,) the curve with its error
-
-    Returns
-    -------
-    Estimate
-        the mean is the number that `of` returns for the curve; the error is ``|a - b| / 2``, where
-        a and b are the numbers for the curve plus its error and for the curve minus its error; mean
-        and error are NaN if a or b is NaN, or if the curve has no error
-
-    Examples
-    --------
-    >>> x = np.linspace(0, 4, 401)
-    >>> curve = Estimate(x, np.full(401, 0.5))
-    >>> mean, error = propagate_error(lambda y: x[np.searchsorted(y, 2.0)], curve)
-    >>> round(float(mean), 2), round(float(error), 2)
-    (2.0, 0.5)
+    The error is half the difference between the numbers for the curve plus and minus its error.
+    Mean and error are NaN if the curve has no error, or if one of these numbers is NaN.
     """
     first, last = (of(curve.mean + sign * curve.error) for sign in (-1, 1))
     error = abs(last - first) / 2
     return Estimate(of(curve.mean) + 0 * error, error)
 
 
+def jackknife(whole: float, rests: np.ndarray) -> Estimate:
+    """Return the jackknife estimate of a number, given its values `rests` (G,) without each block.
+
+    All G blocks, such as runs, contain equal parts of the sample; `whole` is the value for all.
+    """
+    return estimate(len(rests) * whole - (len(rests) - 1) * np.asarray(rests))
+
+
+class PseudoValues(NamedTuple):
+    """Pseudo-values (G, ...) of the jackknife for G blocks of time of any length."""
+
+    values: np.ndarray
+    share: np.ndarray  # fraction of the sample that is in the block
+
+    def mean(self) -> np.ndarray:
+        """Return the mean of the pseudo-values, or NaN if fewer than two blocks contain data."""
+        seen = self.share > 0
+        mean = np.sum(self.share * np.where(seen, self.values, 0), axis=0)
+        return np.where(seen.sum(axis=0) > 1, mean, np.nan)
+
+    def rests(self) -> np.ndarray:
+        """Return weighted deviations (G, ...) of the pseudo-values from their mean.
+
+        The squared error of the mean is the sum of their squares.
+        """
+        seen = self.share > 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))
+            return np.where(seen, root * (self.values - self.mean()), 0)
+
+    def estimate(self, correlation: np.ndarray | float = 0.0) -> Estimate:
+        """Return the mean of the pseudo-values with its error.
+
+        `correlation` is the correlation of neighbouring blocks of time: twice the sum of d_k
+        d_(k+1) divided by the sum of d_k^2, where d_k is the deviation of block k from the mean.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            error = np.sqrt(np.sum(self.rests() ** 2, axis=0))
+            samples = 1 / np.sum(self.share**2, axis=0)
+            wider = np.sqrt((1 + correlation) / (1 - correlation / (len(self.values) - 1)))
+        return Estimate(self.mean(), wider * student(samples) * error)
+
+
+def jackknife_of_sums(
+    of: Callable[[np.ndarray], np.ndarray], sums: np.ndarray, weights: np.ndarray
+) -> PseudoValues:
+    """Return the jackknife pseudo-values (G, ...) of a function of sums over blocks of time."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        total = sums.sum(axis=0)
+        rest = np.stack([of(total - one) for one in sums])
+        share = np.broadcast_to(weights / weights.sum(axis=0), rest.shape)
+        return PseudoValues(rest + (of(total) - rest) / share, share)
+
+
 def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None) -> Estimate:
-    """Estimate a probability density by a histogram.
+    """Estimate the density (B,) of a sample (n,) in bins with the edges (B + 1,).
 
-    Parameters
-    ----------
-    values : numpy.ndarray
-        (n,) the sample
-    bins : numpy.ndarray
-        (B + 1,) edges of the bins
-    independent : int, optional
-        number of independent values in the sample [all values]
-
-    Returns
-    -------
-    Estimate
-        (B,) density with error; its integral is the fraction of the values inside the bins
-
-    Examples
-    --------
-    >>> binned(np.array([0.1, 0.2, 0.7, 0.8]), np.array([0.0, 0.5, 1.0])).mean
-    array([1., 1.])
+    The error is that of `independent` values [n]; the integral is the fraction inside the bins.
     """
     share = np.histogram(values, bins)[0] / len(values)
     error = np.sqrt(share * (1 - share) / (independent or len(values)))
@@ -229,9 +229,7 @@ def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None)
 
 
 def excess_kurtosis(speed: np.ndarray) -> float:
-    """Return the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 of speeds.
-
-    The formula is for speeds in two dimensions.
+    """Return the second Sonine coefficient a2 = <v^4> / (2 <v^2>^2) - 1 of speeds in the plane.
 
     Parameters
     ----------
@@ -263,8 +261,7 @@ def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        mean and error, rounded to two significant digits of the error; only the mean if the error
-        is NaN
+        both, rounded to two significant digits of the error; the mean alone if the error is NaN
 
     Examples
     --------
@@ -280,27 +277,10 @@ def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
 
 
 def kurtosis_noise(count: int) -> float:
-    """Return the standard deviation of `excess_kurtosis` for Maxwellian speeds.
+    """Return the standard deviation of a2, from `excess_kurtosis`, of Maxwellian speeds.
 
-    The square x = v^2 of a Maxwellian speed v has an exponential distribution, whose mean is 1 in
-    suitable units. To first order in deviations of sample means, a2 equals the mean of x^2 / 2 - 2
-    x over the sample minus the expected value of x^2 / 2 - 2 x.  The variance of x^2 / 2 - 2 x is
-    20 / 4 + 4 * 1 - 2 * 4 = 1.
-
-    Parameters
-    ----------
-    count : int
-        number of speeds
-
-    Returns
-    -------
-    float
-        the standard deviation
-
-    Examples
-    --------
-    >>> float(kurtosis_noise(10000))
-    0.01
+    With x = v^2 distributed exponentially with mean 1, a2 is to first order the sample mean of x^2
+    / 2 - 2 x minus its expectation; the variance of a single term is 20 / 4 + 4 * 1 - 2 * 4 = 1.
     """
     return 1 / np.sqrt(count)
 
@@ -308,23 +288,21 @@ def kurtosis_noise(count: int) -> float:
 def fit_power_law(
     x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None, runs: ArrayLike = MANY
 ) -> PowerLaw | None:
-    """Fit a power law as a straight line of ln y against ln x; see `fit_law` for the error.
+    """Fit a power law as a straight line of ln y against ln x; `fit_law` explains the errors.
 
     Parameters
     ----------
     x, y : numpy.ndarray
-        (P,) the points; points with a coordinate that is not positive are left out
+        (P,) points; those with a coordinate that is not positive are left out
     y_error : numpy.ndarray, optional
-        (P,) errors of y; without them the error of the fit follows from the scatter of the points
+        (P,) errors of y [estimated from the scatter of the points]
     runs : array_like, optional
-        number of runs from which each error of y was estimated, a number or (P,); without it the
-        errors are exact
+        number of runs behind each error, a number or (P,) [the errors are exact]
 
     Returns
     -------
     PowerLaw or None
-        factor and exponent, with the error of the exponent, or None if fewer than three points have
-        different x
+        factor and exponent, or None for fewer than three different x
 
     Examples
     --------
@@ -354,34 +332,31 @@ def fit_law(
     runs: ArrayLike = MANY,
     bounds: tuple[Sequence[float], Sequence[float]] = ((-np.inf, -np.inf), (np.inf, np.inf)),
 ) -> LawFit | None:
-    """Fit two parameters of a law to the logarithms of points; all points have equal weights.
+    """Fit the two parameters of a law to the logarithms of points with equal weights.
 
-    Weights from the errors of few runs would be too noisy: with four runs they would increase the
-    scatter of an exponent, and its error would be too small.  If the points deviate from the law by
-    more than their errors explain, the errors of the parameters are multiplied by the square root
-    of chi^2 per degree of freedom.  All errors contain Student's factor.
+    If the points deviate from the law by more than their errors explain, the errors of the
+    parameters are multiplied by sqrt(chi^2 per degree of freedom). All errors include Student's
+    factor. The page docs/explanation/statistics.md explains why the weights are equal.
 
     Parameters
     ----------
     logarithm : callable
         function of x and the two parameters that returns ln y
     x, y : array_like
-        (P,) the points; points with a coordinate that is not positive are left out
+        (P,) points; those with a coordinate that is not positive are left out
     start : sequence of float
-        (2,) values of the parameters from which the search begins
+        (2,) initial values of the parameters
     y_error : array_like, optional
-        (P,) errors of y; without them the errors of the parameters follow from the scatter of the
-        points
+        (P,) errors of y [estimated from the scatter of the points]
     runs : array_like, optional
-        number of runs from which each error of y was estimated, a number or (P,); without it the
-        errors are exact
+        number of runs behind each error, a number or (P,) [the errors are exact]
     bounds : tuple, optional
-        smallest and largest allowed values of the parameters
+        smallest and largest values of the parameters
 
     Returns
     -------
     LawFit or None
-        the parameters, or None if fewer than three points have different x
+        the parameters, or None for fewer than three different x
 
     Examples
     --------
@@ -407,7 +382,7 @@ def fit_law(
 def usable(
     x: ArrayLike, y: ArrayLike, error: ArrayLike | None, runs: ArrayLike
 ) -> tuple[np.ndarray, ...]:
-    """Return x, y, error and number of runs of the points at which the first three are positive."""
+    """Return x, y, error and number of runs of the points whose first three are positive."""
     x, y, error = (np.asarray(part, dtype=float) for part in (x, y, error))
     good = (x > 0) & (y > 0) & (error > 0)
     return x[good], y[good], error[good], np.broadcast_to(np.asarray(runs, float), x.shape)[good]
@@ -422,10 +397,10 @@ def with_errors(
 ) -> LawFit:
     """Return fitted parameters (K,) with their errors.
 
-    The derivatives of ln y with respect to the parameters are `slopes` (P, K), and `rest` (P,) are
-    the deviations of ln y from the law.  The relative errors of y are `relative` (P,), or unknown.
+    `slopes` (P, K) are the derivatives of ln y with respect to the parameters, `rest` (P,) the
+    deviations of ln y from the law, and `relative` (P,) the relative errors of y, if known.
     """
-    share = np.linalg.pinv(slopes)  # the derivatives (K, P) of the parameters with respect to ln y
+    share = np.linalg.pinv(slopes)  # derivatives (K, P) of the parameters with respect to ln y
     free = len(rest) - 2
     if relative is None:
         variance = np.sum(share**2, axis=1) * (rest @ rest) / free
@@ -441,28 +416,10 @@ def with_errors(
 
 
 def points_miss_a_law(chi2: float, free: int, runs: float) -> bool:
-    """Determine whether points deviate from a law by more than their errors explain.
+    """Return whether a chi^2 per degree of freedom this large has a probability below 0.5 %.
 
-    The test takes into account that the errors are estimates (Welch, Biometrika 38, 330 (1951)).
-
-    Parameters
-    ----------
-    chi2 : float
-        chi^2 per degree of freedom, calculated with errors that include Student's factor
-    free : int
-        degrees of freedom: number of points minus the two parameters of the law
-    runs : float
-        number of runs from which the error of each point was estimated
-
-    Returns
-    -------
-    bool
-        whether the probability of a larger chi^2 by chance is less than 0.5 %
-
-    Examples
-    --------
-    >>> points_miss_a_law(4.0, 8, 100), points_miss_a_law(4.0, 8, 3)
-    (True, False)
+    `chi2` is calculated with errors that include Student's factor, each estimated from a number of
+    `runs` (Welch, Biometrika 38, 330 (1951)); `free` is the number of degrees of freedom.
     """
     if free < 1 or runs < FEWEST_RUNS:
         return False

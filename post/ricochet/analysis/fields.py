@@ -1,15 +1,10 @@
 """Fields of runs in a steady state on a grid of cells, and profiles between two walls.
 
-The docstring of post/fields.py defines the fields.  Errors are computed by the jackknife over
-blocks of time of all runs.  Each block of time is so long that the states at its start and at its
-end are independent.  The jackknife also removes a bias of the temperature: if flow velocity and
-temperature are estimated from the velocities of the same n disks, the temperature is too small by
-the fraction 1 / n.  Blocks of unequal weight are treated as in Busing, Meijer and van der Leeden,
-Statistics and Computing 9, 3 (1999).  In the shapes of arrays, C is the number of cells and G the
-number of blocks.
+The help of post/fields.py defines the fields. Errors and the correction of the bias of kT are those
+of the jackknife over blocks of time (docs/explanation/statistics.md). In shapes of arrays, C is the
+number of cells and G the number of blocks.
 """
 
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -20,7 +15,7 @@ from ..predictions import hard_disks
 from ..reading.files import RunError
 from ..reading.nature import Refused
 from ..reading.reader import SIDES, Run
-from .estimates import Estimate, student
+from .estimates import Estimate, PseudoValues, jackknife_of_sums
 from .statistics import statistical_inefficiency
 from .structure import periods
 from .equilibrium import after_start, comoving, free_disks, refuse_others, unforced
@@ -29,15 +24,14 @@ __all__ = [
     "Fields",
     "Fluxes",
     "fields",
-    "has_theory",
     "places",
     "prediction",
 ]
 
 MOST_BLOCKS = 16  # largest number of blocks of a run
-FEWEST_BLOCKS = 3  # smallest number of blocks of all runs that is required for an error
-FEWEST_DISKS = 3  # fewest disks in a cell without any one block, for kT, stress, heat
-OSCILLATION = 0.05  # share of the centre of mass in the kinetic energy that is not thermal motion
+FEWEST_BLOCKS = 3  # smallest number of blocks, over all runs, that is required for an error
+FEWEST_DISKS = 3  # fewest disks in a cell, leaving out any one block, for kT, stress and heat
+OSCILLATION = 0.05  # share of the centre of mass in kT above which it is not thermal motion
 FLOW_LEAST = -0.5  # smallest correlation of neighbouring blocks of the flow
 LONG = 1.5  # length of a block in units of the statistical inefficiency
 POINTS = 1 << 16  # used with obstacles to find the accessible area
@@ -48,7 +42,7 @@ Cells = tuple[int, int]
 
 
 class Fluxes(NamedTuple):
-    """Fluxes of momentum and energy from one wall to the opposite wall, per length and time."""
+    """Fluxes of momentum and energy from one wall to the opposite one, per length and time."""
 
     pressure: Any  # momentum along the axis; a number or an `Estimate`
     shear: Any  # momentum along the walls; a number or an `Estimate`
@@ -68,59 +62,14 @@ class Block(NamedTuple):
         return float(self.run.time[self.frames[0]])
 
 
-class Members(NamedTuple):
-    """Pseudo-values (G, ...) of the jackknife, one for each block of time."""
-
-    values: np.ndarray
-    share: np.ndarray  # fraction of the sample that is in the block
-
-    def mean(self) -> np.ndarray:
-        """Return the mean of the pseudo-values, or NaN if fewer than two blocks contain data."""
-        seen = self.share > 0
-        mean = np.sum(self.share * np.where(seen, self.values, 0), axis=0)
-        return np.where(seen.sum(axis=0) > 1, mean, np.nan)
-
-    def rests(self) -> np.ndarray:
-        """Return weighted deviations (G, ...) of the pseudo-values from their mean.
-
-        The sum of the squares of the weighted deviations is the squared error of the mean.
-        """
-        seen = self.share > 0
-        with np.errstate(divide="ignore", invalid="ignore"):
-            root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))
-            return np.where(seen, root * (self.values - self.mean()), 0)
-
-    def estimate(self, correlation: np.ndarray | float = 0.0) -> Estimate:
-        """Return the mean of the pseudo-values with its error.
-
-        The argument `correlation` is the correlation of neighbouring blocks of time: twice the sum
-        of the products d_k d_(k+1), divided by the sum of the squares d_k^2, where d_k is the
-        deviation of block k from the mean.
-        """
-        with np.errstate(divide="ignore", invalid="ignore"):
-            error = np.sqrt(np.sum(self.rests() ** 2, axis=0))
-            samples = 1 / np.sum(self.share**2, axis=0)
-            wider = np.sqrt((1 + correlation) / (1 - correlation / (len(self.values) - 1)))
-        return Estimate(self.mean(), wider * student(samples) * error)
-
-
-def jackknife(
-    of: Callable[[np.ndarray], np.ndarray], sums: np.ndarray, weights: np.ndarray
-) -> Members:
-    """Return the jackknife pseudo-values (G, ...) of a function of sums over blocks of time."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        total = sums.sum(axis=0)
-        rest = np.stack([of(total - one) for one in sums])
-        share = np.broadcast_to(weights / weights.sum(axis=0), rest.shape)
-        return Members(rest + (of(total) - rest) / share, share)
-
-
 # --- blocks of time ---
 
 
 def steady_frames(run: Run, skip: float | None) -> list[int]:
     """Return the frames after `skip` collisions per disk, by default the second half of the run."""
-    if any(side.get("motion") in ("constant_velocity", "piston") for side in run.sides):
+    moves_away = any(one.get("motion") in {"piston", "constant_velocity"} for one in run.sides)
+    # a motion that begins during the run needs the second half
+    if moves_away or run.piston_positions:
         why = "has a side that moves away from its position (motion); fields require fixed cells"
         raise Refused(f"{run.path}: {why}")
     start = run.time[-1] / 2 if skip is None else after_start(run, skip)
@@ -132,9 +81,9 @@ def steady_frames(run: Run, skip: float | None) -> list[int]:
 
 
 def own_motion(run: Run, frames: list[int]) -> np.ndarray:
-    """Return velocities (F, N, 2) relative to the shear flow and to the centre of mass.
+    """Return velocities (F, N, 2) relative to the shear flow.
 
-    The motion of the centre of mass is subtracted only if noise moves the centre of mass.
+    They are also relative to the centre of mass if noise moves it.
     """
     v = run.velocity[frames]
     if run.shear_rate:
@@ -146,10 +95,10 @@ def own_motion(run: Run, frames: list[int]) -> np.ndarray:
 
 
 def oscillation_notes(runs: list[Run], skip: float | None, species: str | None) -> list[str]:
-    """Return a note for each run whose flow oscillates, which increases the measured temperatures.
+    """Return a note for each run whose oscillating flow increases the measured temperatures.
 
-    The kinetic energy of the centre of mass of N disks that move independently is the fraction 1/N
-    of their kinetic energy.  A larger fraction belongs to a flow that varies with time.
+    The centre of mass of N independent disks has 1/N of their kinetic energy; more belongs to a
+    flow.
     """
     notes = []
     for run in runs:
@@ -171,9 +120,8 @@ def oscillation_notes(runs: list[Run], skip: float | None, species: str | None) 
 def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
     """Return the largest statistical inefficiency of slowly varying quantities, in frames.
 
-    The slowly varying quantities are the totals of mass, momentum and energy, and Fourier
-    components of the densities of mass, momentum and energy.  The Fourier components have the
-    longest wavelength along each axis that is divided into cells.
+    These are the totals of mass, momentum and energy, and the Fourier components of their densities
+    with the longest wavelength along each axis that is divided into cells.
     """
     place, v = (run.position[frames] - run.lower) / run.edges, own_motion(run, frames)
     waves, found = [np.ones(place.shape[:2])], 1.0
@@ -192,9 +140,8 @@ def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
 def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[Block], float]:
     """Return the blocks of time of all runs, and an upper bound of their correlation.
 
-    The upper bound is the correlation of neighbouring blocks of time that would be expected if the
-    autocorrelation function were exponential.  If there are too few blocks for an error, the upper
-    bound is NaN.
+    The bound is the correlation of neighbouring blocks for an exponential autocorrelation function,
+    or NaN if there are too few blocks for an error.
     """
     refuse_others(runs)
     steady = [steady_frames(run, skip) for run in runs]
@@ -214,14 +161,13 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
 
 
 def block_correlation(
-    members: Members, blocks: list[Block], most: float, least: np.ndarray
+    members: PseudoValues, blocks: list[Block], most: float, least: np.ndarray
 ) -> np.ndarray:
     """Return, for each of F fields (G, F, C), the correlation (F,) of neighbouring blocks of time.
 
-    The correlation is twice the sum of products of the deviations of neighbouring blocks from the
-    mean, divided by the sum of squared deviations.  The correlation of a field is computed from
-    sums over all cells together, because the blocks are too few for an estimate in a single cell.
-    The correlations are limited to the range from `least` (F,) to `most`.
+    This is twice the sum of products of deviations of neighbouring blocks over the sum of squared
+    deviations, summed over all cells of a field because a single cell has too few blocks. It is
+    limited to the range from `least` (F,) to `most`.
     """
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
     rest = np.nan_to_num(members.rests())
@@ -248,14 +194,14 @@ def places(run: Run, cells: Cells) -> np.ndarray:
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
     cells : tuple of int
         numbers of cells along x and y
 
     Returns
     -------
     numpy.ndarray
-        (C, 2) centres [length]; x varies fastest
+        (C, 2) midpoints [length]; x varies fastest
 
     Examples
     --------
@@ -267,10 +213,9 @@ def places(run: Run, cells: Cells) -> np.ndarray:
 
 
 def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
-    """Return the area (C,) of each cell that centres of disks with the given radius can reach.
+    """Return the area (C,) of each cell accessible to centres of disks with the given radius.
 
-    In cells beside obstacles, the accessible area is approximate, with an error of at most 0.5 % of
-    the area of a cell.
+    Beside obstacles its error is at most 0.5 % of the area of a cell.
     """
     spans, inner = [], []
     step = np.sqrt(run.edges.prod() / POINTS)
@@ -306,9 +251,8 @@ def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
 def sums(block: Block, cells: Cells, areas: list[np.ndarray], own: np.ndarray) -> np.ndarray:
     """Return 12 sums for each cell (12, C) over the frames of a block, for the disks `own` (N,).
 
-    The sums are the number of frames, the number of disks, disks per area, and the sums of m, m v,
-    m v v (xx, xy, yy), m v^2 v / 2 and I omega^2.  In a sheared box v is relative to the shear
-    flow.  If noise moves the centre of mass, v is relative to the centre of mass.
+    They are the number of frames, the number of disks, disks per area, and the sums of m, m v, m v
+    v (xx, xy, yy), m v^2 v / 2 and I omega^2, with v of `own_motion`.
     """
     run, frames, _ = block
     place = run.position[frames][:, own].reshape(-1, 2) - run.lower
@@ -331,19 +275,18 @@ NAMES = (
     *("density", "flow_x", "flow_y", "temperature", "kT_x", "kT_y", "rotational_temperature"),
     *("stress_xx", "stress_xy", "stress_yy", "heat_x", "heat_y"),
 )
-#: Smallest correlation of neighbouring blocks.  The flow is the rate of change of a bounded
-#: displacement, so that neighbouring blocks of the flow can be anticorrelated.
+#: Smallest correlation of neighbouring blocks. The flow is the rate of change of a bounded
+#: displacement, so its neighbouring blocks can be anticorrelated.
 LEAST = np.array([FLOW_LEAST if name.startswith("flow") else 0.0 for name in NAMES])
 BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in NAMES])
 
 
 def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
-    """Return the fields (12, C) that follow from `sums`; fields of cells without disks are NaN.
+    """Return the fields (12, C) calculated from `sums`; NaN in cells without disks.
 
-    In cells with fewer than `FEWEST_DISKS` disks, kT, stress and heat flux are NaN.  If the flow
-    velocity has the gradient g, the flow velocity changes by g h across a cell of width h.  The
-    variation of the flow velocity within the cell contributes m (g h)^2 / 12 per disk to the sum of
-    m v v; the function `of_sums` subtracts this amount.
+    kT, stress and heat flux are NaN in cells with fewer than `FEWEST_DISKS` disks. The variation g
+    h of a flow with the gradient g across a cell of width h contributes m (g h)^2 / 12 per disk to
+    the sum of m v v, which is subtracted.
     """
     frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
     u, v, density = mx / mass, my / mass, dense / frames
@@ -385,23 +328,21 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     runs : list of Run
         (R,) runs of one input, which differ by their seed
     skip : float, optional
-        duration of the equilibration, in collisions per disk [the first half of each run]
+        collisions per disk that are left out [the first half of each run]
     cells : tuple of int
         numbers of cells along x and y
     species : str, optional
-        name of the species whose disks are measured, with kT relative to the flow of the species
-        [all disks]
+        species to measure, with kT relative to its own flow [all disks]
 
     Returns
     -------
     Fields
-        means and errors of the fields, which are NaN in cells that contain disks in fewer than two
-        blocks of time
+        fields with errors, NaN in cells that contain disks in fewer than two blocks of time
 
     Raises
     ------
     RunError
-        if a run has too few frames, or if a side moves away from its initial position
+        if a run has too few frames, or a side moves away from its initial position
 
     Examples
     --------
@@ -415,14 +356,14 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     own = run.species > 0 if species is None else run.of_species(species)
     parts = np.stack([sums(block, cells, areas, own) for block in blocks])
     weights = parts[:, np.where(BY_FRAMES, 0, 1)]
-    values, share = jackknife(lambda total: of_sums(total, run, cells), parts, weights)
-    # If the total momentum is conserved, the total thermal energy of N disks is smaller than N kT
-    # (docs/explanation/laws.md). Therefore the measured temperature is multiplied by the ratio of
-    # N to the effective number of disks.
+    values, share = jackknife_of_sums(lambda total: of_sums(total, run, cells), parts, weights)
+    # If the total momentum is conserved, the thermal energy of N disks is smaller than N kT
+    # (docs/explanation/laws.md), so the temperature is multiplied by the ratio of N to the
+    # effective number of disks.
     values[:, NAMES.index("temperature")] *= run.n_disks / free_disks(run)
     for axis, name in enumerate(("kT_x", "kT_y")):
         values[:, NAMES.index(name)] *= run.n_disks / (run.n_disks - comoving(run)[axis])
-    members = Members(values, share)
+    members = PseudoValues(values, share)
     near = block_correlation(members, blocks, most, LEAST)
     mean, error = members.estimate(near[:, None])
     frames, disks = parts[:, :2].sum(axis=0)
@@ -452,8 +393,8 @@ def gained(block: Block, name: str) -> np.ndarray:
     return np.array([np.interp(ends, time, part) @ (-1, 1) for part in np.atleast_2d(value.T)])
 
 
-def fluxes(blocks: list[Block], axis: int) -> Members:
-    """Return the fluxes (G, 3) that follow from the momentum and energy passed to both walls."""
+def fluxes(blocks: list[Block], axis: int) -> PseudoValues:
+    """Return the fluxes (G, 3) calculated from the momentum and energy passed to both walls."""
     run, (near, far) = blocks[0].run, ACROSS[axis]
     length = 2 * run.edges[1 - axis]
     parts = []
@@ -464,18 +405,17 @@ def fluxes(blocks: list[Block], axis: int) -> Members:
         )
         parts.append([impulse[axis], impulse[1 - axis], *energy, block.end - block.start])
     sums = np.array(parts)
-    return jackknife(lambda total: total[:3] / total[3] / length, sums, sums[:, 3:])
+    return jackknife_of_sums(lambda total: total[:3] / total[3] / length, sums, sums[:, 3:])
 
 
 def expected(
     run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[float, float]
 ) -> np.ndarray:
-    """Predict flow, kT and density (P, 3) at positions x from flow and kT midway between the walls.
+    """Predict flow velocity, kT and density at x, (P, 3), given the first two at mid-channel.
 
-    The flow u is parallel to the walls, and the pressure is uniform.  The equations dT/dx =
-    -(energy - shear u) / conductivity and du/dx = -shear / viscosity are integrated, where `energy`
-    and `shear` are fluxes.  If no gas can have the given fluxes, ValueError is raised; for such
-    fluxes the temperature would become negative, or the density would exceed close packing.
+    The pressure is uniform, and dT/dx = -(energy - shear u) / conductivity and du/dx = -shear /
+    viscosity are integrated with the fluxes `energy` and `shear`. ValueError is raised if the
+    temperature would become negative or the density exceed close packing.
     """
     diameter, mass = 2 * run.radius[0], run.mass[0]
     per_disk = np.pi * diameter**2 / 4
@@ -509,25 +449,10 @@ def expected(
 
 
 def has_theory(runs: list[Run], axis: int) -> bool:
-    """Determine whether Enskog's theory applies to the gas between two opposite walls.
+    """Return whether Enskog's theory applies to the gas between two opposite walls.
 
-    Parameters
-    ----------
-    runs : list of Run
-        (R,) runs
-    axis : int
-        axis perpendicular to the walls: 0 for x, 1 for y
-
-    Returns
-    -------
-    bool
-        whether the only walls are two opposite sides, and the disks are smooth, elastic and of one
-        species
-
-    Examples
-    --------
-    >>> fields.has_theory(runs, 0)
-    False
+    The walls, perpendicular to the axis 0 (x) or 1 (y), must be the only ones, and the disks
+    smooth, elastic and of one species.
     """
     return all(
         not run.periodic[axis] and run.periodic[1 - axis] and run.nature <= LAWFUL for run in runs
@@ -551,10 +476,9 @@ def prediction(
     Returns
     -------
     profiles : dict of str to Estimate or None
-        (P,) predicted "flow", "temperature" and "density", or None if no gas can have the measured
-        fluxes
+        (P,) "flow", "temperature" and "density"; None if no gas can have the measured fluxes
     fluxes : ricochet.fields.Fluxes
-        the pressure, shear stress and heat flux measured at the walls
+        pressure, shear stress and heat flux at the walls
 
     Raises
     ------
@@ -577,7 +501,7 @@ def prediction(
         raise RunError(f"{run.path}: too few disks in the middle; use fewer --cells")
     flux = fluxes(measured.blocks, axis)
     share = flux.share[:, :1]
-    given = Members(np.hstack([flux.values, middle]), np.tile(share, 5))
+    given = PseudoValues(np.hstack([flux.values, middle]), np.tile(share, 5))
     near = [measured.correlation[name] for name in names]
     mean, error = given.estimate(np.array([0 * near[0]] * 3 + near))
     rest = given.rests()

@@ -1,16 +1,9 @@
 """Tests of the speeds of disks against the expected distribution.
 
-The speeds of each frame are scaled by the energy of the frame, so that conserved and slowly
-fluctuating energies do not influence the test.  Scaled speeds deviate less from the expected
-distribution than independent values would (Lilliefors, Journal of the American Statistical
-Association 62, 399 (1967)).  The p-values follow from a comparison with random frames, which have
-as many disks as the measured frames and are scaled like the measured frames.  The velocities in a
-random frame are uniformly distributed on the sphere of constant energy.  Along axes where the total
-momentum is conserved, or changed only by noise, velocities are relative to the centre of mass.  If
-the frames of a run are correlated, the measured statistics are divided by the statistical
-inefficiency of the series of frames.  The measured inefficiency is only an estimate.  Therefore the
-statistics of random frames are divided by random estimates of an inefficiency, so that the p-values
-include the uncertainty of the estimate.
+The speeds of each frame are scaled by its energy and, where momentum is conserved, taken relative
+to the centre of mass. The p-values follow from random frames of equally many disks on the sphere of
+constant energy, which are scaled in the same way. Correlations between frames are included by a
+statistical inefficiency. See "p-values of speeds" in docs/explanation/statistics.md.
 """
 
 from collections.abc import Sequence
@@ -28,13 +21,14 @@ from .equilibrium import comoving, thermal_energy
 __all__ = ["SpeedTest", "speed_test"]
 
 BINS = 30  # of equal probability
-DRAWN = 4000  # drawn samples
-MOST = 1000  # speeds of a drawn sample; more have the same distribution of the scaled statistics
+DRAWN = 4000  # number of random samples
+# speeds of a random sample; with more, the scaled statistics have the same distribution
+MOST = 1000
 MANY = 2000  # number of disks above which the motion of the centre of mass is negligible
 NOISES = 400  # random estimates of a statistical inefficiency
-LONG = 200  # number of frames above which the noise of this estimate is negligible
+LONG = 200  # number of frames above which the noise of such an estimate is negligible
 LEAST = 0.5  # smallest statistical inefficiency of frames, whose correlations are positive
-TAIL = 0.05  # fraction of the samples that an exponential tail replaces
+TAIL = 0.05  # fraction of the random statistics that an exponential tail replaces
 
 
 class SpeedTest(NamedTuple):
@@ -49,10 +43,10 @@ class SpeedTest(NamedTuple):
 
 
 def shares(run: Run, frames: Index, name: str) -> np.ndarray:
-    """Return the energies (F, n) of the disks of a species, divided by the mean energy per disk.
+    """Return the energies of the disks of a species, divided by the mean energy; shape (F, n).
 
-    For a run in equilibrium, the mean energy is the mean over all disks in the frame.  For any
-    other run, the mean energy is the mean over the disks of the species.
+    In each frame the mean is taken over all disks if the run is in equilibrium, and otherwise over
+    the disks of the species.
     """
     energy, own = thermal_energy(run, frames), run.of_species(name)
     unit = energy if run.nature.in_equilibrium else energy[:, own]
@@ -60,7 +54,7 @@ def shares(run: Run, frames: Index, name: str) -> np.ndarray:
 
 
 class Sample(NamedTuple):
-    """Numbers of disks and frames in a sample of speeds, and constraints on energy and momentum."""
+    """Size of a sample of speeds, and the conservation laws that restrict its speeds."""
 
     sharing: int  # disks that share the energy
     own: int  # disks of the species
@@ -108,11 +102,7 @@ def sample_of(run: Run, name: str, frames: int) -> Sample:
 
 
 def statistics_of(values: np.ndarray) -> np.ndarray:
-    """Compare S samples (S, n) with the uniform distribution; return n D^2 and chi^2, (2, S).
-
-    The uniform distribution is over the interval from 0 to 1.  D is the Kolmogorov-Smirnov distance
-    between a sample and the uniform distribution.
-    """
+    """Compare samples (S, n) with the uniform distribution; return n D^2 and chi^2 (2, S)."""
     samples, n = values.shape
     ranks, ordered = np.arange(n) / n, np.sort(values, axis=1)
     distance = np.maximum(ordered - ranks, ranks + 1 / n - ordered).max(axis=1)
@@ -134,10 +124,8 @@ def by_chance(sample: Sample) -> np.ndarray:
 def chance(found: float, drawn: np.ndarray) -> float:
     """Return the probability that a random statistic exceeds the measured statistic `found`.
 
-    The argument `drawn` (S,) contains random statistics in increasing order.  The probability is
-    the fraction of the values in `drawn` that are larger than `found`.  Above the 95 % quantile of
-    the random statistics, the probability follows from an exponential distribution that is fitted
-    to the random statistics above this quantile.
+    This is the fraction of larger values in `drawn` (S,), sorted random statistics. Above their 95
+    % quantile, a fitted exponential distribution is used instead.
     """
     first = int(len(drawn) * (1 - TAIL))
     if found <= drawn[first]:
@@ -147,12 +135,11 @@ def chance(found: float, drawn: np.ndarray) -> float:
 
 
 def inefficiency(counts: Sequence[np.ndarray], cumulative: bool) -> float:
-    """Return the statistical inefficiency of the numbers of disks in bins, averaged over runs.
+    """Return the statistical inefficiency of numbers of disks in bins, averaged over runs.
 
-    The argument `counts` contains the numbers (F, B) of disks in B bins in each of the F frames of
-    a run.  If `cumulative` is true, the numbers are first summed over bins, as in the
-    Kolmogorov-Smirnov distance.  For a run with fewer than three frames, the statistical
-    inefficiency is set to 1.
+    `counts` contains the numbers (F, B) of disks in B bins in F frames of each run, which are
+    summed over bins if `cumulative`, as in the Kolmogorov-Smirnov distance. A run with fewer than
+    three frames has the inefficiency 1.
     """
     series = [np.cumsum(own, axis=1)[:, :-1] if cumulative else own for own in counts]
     found = [statistical_inefficiency(own, LEAST) if len(own) > 2 else 1.0 for own in series]
@@ -163,10 +150,8 @@ def inefficiency(counts: Sequence[np.ndarray], cumulative: bool) -> float:
 def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
     """Return random estimates (NOISES,) of a statistical inefficiency, divided by its true value.
 
-    For 20 frames the relative noise of an estimated inefficiency is about a third.  The argument
-    `sizes` contains the numbers of frames of the runs.  The function draws random series of the
-    numbers of disks in bins.  The autocorrelation of the random series decays exponentially, with
-    the statistical inefficiency `true`.
+    They are made from random numbers of disks in bins, for runs with `sizes` frames, whose
+    autocorrelation decays exponentially. For 20 frames their relative noise is about a third.
     """
     if sum(sizes) > LONG:
         return np.ones(NOISES)
@@ -179,10 +164,8 @@ def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
 def correlated(values: np.ndarray, keep: float) -> np.ndarray:
     """Convert independent values (F, ..., B) into an autoregressive series of F frames.
 
-    Each frame is `keep` times the previous frame plus independent noise.
-
-    The values of the B bins in a frame add up to zero, because they represent deviations of the
-    numbers of disks, whose total is fixed.
+    Each frame is `keep` times the previous frame plus noise. The values of the B bins of a frame
+    are deviations of numbers of disks, and add up to zero.
     """
     values = values - values.mean(axis=-1, keepdims=True)
     for k in range(1, len(values)):
@@ -195,9 +178,9 @@ def p_value(
 ) -> float:
     """Return the probability that a random statistic exceeds the measured statistic `found`.
 
-    The argument `drawn` (DRAWN,) contains statistics of random samples of independent frames.
-    The argument `own` is the statistical inefficiency of the measured frames, and `sizes` contains
-    the numbers of frames of the runs in increasing order.
+    `drawn` (DRAWN,) are statistics of random independent frames, `own` is the statistical
+    inefficiency of the measured frames, and `sizes` are the numbers of frames of the runs in
+    increasing order.
     """
     true = float(f"{max(1, own):.2g}")
     estimates = np.tile(noise(sizes, true, cumulative), DRAWN // NOISES)
@@ -219,10 +202,9 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
     Returns
     -------
     SpeedTest
-        statistics and p-values of the Kolmogorov-Smirnov test and of the chi-square test.  If the
-        expected distribution is not known, `law` is "none" and all statistics and p-values are NaN.
-        The distribution is not known for disks that conserve their angular momentum in a round
-        container, and for fewer than three disks that share a fixed energy
+        statistics and p-values of the Kolmogorov-Smirnov and chi-square tests; `law` is "none" and
+        they are NaN if the distribution is unknown: for disks that conserve their angular momentum
+        in a round container, and for fewer than three disks that share a fixed energy
 
     Examples
     --------

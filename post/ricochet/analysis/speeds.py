@@ -7,47 +7,24 @@ import numpy as np
 from ..reading.arrays import Index, chosen
 from ..reading.nature import Refused
 from ..reading.reader import Run
+from ..reading.results import CHUNK
 from .estimates import Estimate, excess_kurtosis
 from .statistics import combine_runs, correlated_mean
 from .equilibrium import comoving, thermal_energy
 
 __all__ = [
-    "kt_of_frames",
     "means",
     "reduced_speeds",
-    "relaxation",
 ]
 
 
 def kt_of_frames(
     run: Run, frames: Index, species: str | None = None, component: int | None = None
 ) -> np.ndarray:
-    """Return kT in the given frames, excluding any conserved motion of the centre of mass.
+    """Return kT (F,) in frames, relative to the shear flow and to the centre of mass.
 
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-    frames : ricochet.arrays.Index
-        frames to use
-    species : str, optional
-        name of the species [all disks together]
-    component : int, optional
-        0 for the temperature kT_x of the x components of velocities, 1 for kT_y of the y components
-        [the mean of kT_x and kT_y]
-
-    Returns
-    -------
-    numpy.ndarray
-        (F,) kT; in a sheared box, velocities are relative to the shear flow
-
-    Examples
-    --------
-    >>> bool(np.allclose(speeds.kt_of_frames(run, [0, -1]), thermodynamics.kt_at_start(run)))
-    True
-    >>> kt_x, kt_y = (speeds.kt_of_frames(run, [-1], component=k) for k in (0, 1))
-    >>> bool(np.allclose((kt_x + kt_y) / 2, thermodynamics.kt_at_start(run)))
-    True
+    The motion of the centre of mass is subtracted along axes where momentum is conserved. `species`
+    selects disks, and `component` 0 or 1 the temperature kT_x or kT_y [their mean].
     """
     own = slice(None) if species is None else run.of_species(species)
     energy = thermal_energy(run, frames, component)[:, own].mean(axis=1)
@@ -65,14 +42,13 @@ def reduced_speeds(
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
     frames : ricochet.arrays.Index
         frames to use
     each : bool
-        whether the speeds of each frame are scaled with kT of that frame instead of the mean kT of
-        all frames
+        whether kT is that of each frame, and not the mean over all frames
     species : str, optional
-        name of the species [all species]
+        name of the species [all]
 
     Returns
     -------
@@ -105,10 +81,9 @@ def reduced_speeds(
 def moment(members: Sequence[np.ndarray], power: int, independent: float) -> Estimate:
     """Return the mean of u^power for speeds u that are first scaled to a mean square of 1.
 
-    The argument `members` contains the speeds (F, n) of n disks in F frames of each run.  The error
-    follows from the time series of the mean of u^power over the disks of each frame, corrected for
-    the scaling of the speeds.  If a single run has too few frames for a time series, the error is
-    that of a sample of uncorrelated speeds whose number is `independent`.
+    `members` contains the speeds (F, n) of n disks in F frames of each run. The error is that of
+    the time series of frames, corrected for the scaling, or that of `independent` uncorrelated
+    speeds if a single run has too few frames.
     """
     u = np.concatenate([one.ravel() for one in members])
     mean = np.mean(u**power)
@@ -128,35 +103,22 @@ def all_move(run: Run, frame: int) -> bool:
 def relaxation(
     run: Run, until: float = 16, frames: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return collisions per disk and the second Sonine coefficient a2 of speeds in early frames.
+    """Return collisions per disk (F,) and the second Sonine coefficient a2 (F,) of early frames.
 
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-    until : float
-        largest number of collisions per disk in the frames that are used
-    frames : int, optional
-        number of frames from the start of the run, which replaces `until`
-
-    Returns
-    -------
-    tau, a2 : numpy.ndarray
-        (F,) collisions per disk, and the coefficient a2; frames in which all disks of a species are
-        at rest are left out
-
-    Examples
-    --------
-    >>> tau, a2 = speeds.relaxation(run, until=5)
-    >>> len(tau) == len(a2) > 1, float(tau[0])
-    (True, 0.0)
+    These are frames in which disks of all species move, with at most `until` collisions per disk
+    or, if given, the first `frames`.
     """
     tau = run.collisions_per_disk_at(run.time)
     if frames is None:
         chosen = [k for k in np.flatnonzero(tau <= until).tolist() if all_move(run, k)]
     else:
         chosen = list(range(min(frames, run.n_frames)))
-    return tau[chosen], np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in chosen])
+    found: list[float] = []
+    for some in np.array_split(chosen, len(chosen) * run.n_disks // CHUNK + 1):
+        if len(some):
+            speeds = reduced_speeds(run, some.tolist(), each=True)
+            found += map(excess_kurtosis, speeds.reshape(len(some), -1))
+    return tau[chosen], np.array(found)
 
 
 def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Estimate, Estimate]:
@@ -174,9 +136,8 @@ def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Esti
     Returns
     -------
     tuple of Estimate
-        mean speed and mean energy; the errors follow from the means of successive frames or, if the
-        runs have few frames or differ by more than these errors explain, from the scatter of the
-        runs
+        mean speed and mean energy, with errors from the autocorrelation of frames or, for few
+        frames or runs that differ significantly, from the scatter of the runs
 
     Examples
     --------

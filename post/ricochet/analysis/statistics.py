@@ -1,8 +1,7 @@
 """Means of correlated time series, with errors and warnings; includes the module `estimates`.
 
-The functions `estimate` and `correlated_mean` compute a mean and its error.  The function
-`estimate` is for independent values, such as the results of runs that differ by their seed.  The
-function `correlated_mean` is for a single series in time, whose samples are correlated.
+Independent values, such as the results of runs with different seeds, are averaged by `estimate`,
+the correlated samples of a single time series by `correlated_mean`.
 """
 
 from collections.abc import Sequence
@@ -19,14 +18,11 @@ from .estimates import (
     LawFit,
     LawTest,
     PowerLaw,
-    binned,
     estimate,
     excess_kurtosis,
     fit_law,
     fit_power_law,
     goodness_of_fit,
-    kurtosis_noise,
-    propagate_error,
     rounded_to_error,
     student,
 )
@@ -38,23 +34,16 @@ __all__ = [
     "LawTest",
     "PowerLaw",
     "SeriesMean",
-    "binned",
     "combine_runs",
     "correlated_mean",
-    "diagnostics",
     "equilibration",
     "estimate",
     "excess_kurtosis",
     "fit_law",
     "fit_power_law",
     "goodness_of_fit",
-    "has_drift",
-    "has_trend",
-    "kurtosis_noise",
-    "propagate_error",
     "rounded_to_error",
     "statistical_inefficiency",
-    "student",
     "windows",
 ]
 
@@ -73,7 +62,7 @@ class SeriesMean(NamedTuple):
     mean: float
     error: float  # half the 68 % interval, or NaN for fewer than `FEWEST` independent samples
     samples: float  # number of independent samples
-    drift: float  # slope over its error; a standard Gaussian variable without a drift
+    drift: float  # slope over its error: a standard Gaussian variable if there is no drift
     freedom: float = np.inf  # degrees of freedom of the error
 
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
@@ -82,11 +71,7 @@ class SeriesMean(NamedTuple):
 
 
 def cells(series: np.ndarray, count: int) -> np.ndarray:
-    """Return the means of about `count` equal parts of a series (T,).
-
-    If the length of the series is not a multiple of the length of a part, the remaining samples at
-    the start of the series are left out.
-    """
+    """Return the means of about `count` equal parts of a series (T,), without its first rest."""
     width = max(1, len(series) // count)
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
 
@@ -94,17 +79,15 @@ def cells(series: np.ndarray, count: int) -> np.ndarray:
 def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     """Estimate the statistical inefficiency 1 + 2 tau of a series.
 
-    tau is the integrated autocorrelation time, in samples.  The variance of the mean of correlated
-    samples is the variance for independent samples times the statistical inefficiency.  The sum of
-    autocorrelations is truncated, and corrected for the unknown mean, by the method of Wolff,
-    Computer Physics Communications 156, 143 (2004), with the parameter S = 1.5.  A sum that ends at
-    the first negative autocorrelation would underestimate the error of short series.
+    It is the factor by which correlations increase the variance of the mean; tau is the integrated
+    autocorrelation time in samples, truncated and corrected for the unknown mean as by Wolff,
+    Computer Physics Communications 156, 143 (2004), with S = 1.5.
 
     Parameters
     ----------
     series : numpy.ndarray
-        (T,) samples at equal intervals, or (T, K) samples of K quantities, whose autocorrelations
-        are added
+        (T,) samples at equal intervals, or (T, K) for K quantities, whose autocorrelations are
+        added
     least : float
         lower bound of the result, which is below 1 for anticorrelated samples
 
@@ -139,30 +122,25 @@ def inefficiency_and_lag(series: np.ndarray, least: float) -> tuple[float, int]:
 
 
 def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
-    """Estimate the mean of a correlated series, or the ratio of the sums of two correlated series.
+    """Estimate the mean of a correlated series, or the ratio of the sums of two such series.
 
-    The estimate is the ratio R of the sums of the two series.  The error of the ratio R is the
-    error of the mean of the series (amount - R per) / (mean of per), estimated from the slowest
-    Fourier components of the series.
-
-    The error describes fluctuations that occur within the series.  If a state never changes during
-    a run, such as the order of disks in a narrow channel or the structure of a glass, the error of
-    one run does not contain the differences between such states.  Use the scatter of several runs
-    with different starts.
+    The error is estimated from the slowest Fourier components, as docs/explanation/statistics.md
+    describes. It covers fluctuations within the series, but not states that last as long as the
+    run, such as the structure of a glass; for these, use the scatter of several runs.
 
     Parameters
     ----------
     amount : array_like
-        (T,) samples of a series in equilibrium, such as numbers of collisions
+        samples of a series in equilibrium, such as numbers of collisions; shape (T,)
     per : array_like
-        (T,) series whose sum divides the sum of `amount`, such as durations; a number stands for a
-        constant series
+        series whose sum is the divisor, such as the durations in which the collisions were
+        counted; shape (T,), or a constant
 
     Returns
     -------
     SeriesMean
-        the ratio of the sums with its error, the effective number of independent samples, and the
-        drift; if a few parts of the series `per` contain most of its sum, the error is NaN
+        sum of `amount` divided by the sum of `per`; the error is NaN if most of the sum of `per`
+        is due to a short part of the series
 
     Examples
     --------
@@ -189,20 +167,12 @@ def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> Series
 def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     """Return standard error of the mean, degrees of freedom and drift of a series (T,).
 
-    The means over parts of the series are transformed by a discrete cosine transform.  The squared
-    standard error is the mean square of the first coefficients except the constant coefficient,
-    divided by the number of parts.  The error is estimated by the method of Lazarus, Lewis, Stock
-    and Watson, Journal of Business and Economic Statistics 36, 541 (2018).  Only cosine waves whose
-    period is longer than the correlation length of the series are used.  Let a be the first
-    coefficient of the cosine transform after the constant one, and b the root mean square of the
-    following coefficients.  If the series does not drift, -a / b has Student's distribution.  The
-    returned drift is -a / b, converted to a Gaussian variable with variance 1.
-
-    The correlation length is the estimated statistical inefficiency plus the standard deviation of
-    this estimate (Madras and Sokal, Journal of Statistical Physics 50, 109 (1988)).  The standard
-    deviation of the estimate is added, because an inefficiency that is underestimated by chance
-    would lead to an error that is too small.  For an anticorrelated series, the function
-    `periodic_waves` computes the error.
+    The squared error is the mean square of the first coefficients of a cosine transform (Lazarus et
+    al., Journal of Business and Economic Statistics 36, 541 (2018)) whose period exceeds the
+    correlation length: the inefficiency plus its standard deviation (Madras and Sokal, Journal of
+    Statistical Physics 50, 109 (1988)). The drift is the first coefficient over the root mean
+    square of the following ones, which has Student's distribution, converted to a Gaussian
+    variable.
     """
     parts = cells(series, FINE)
     per_sample, lag = inefficiency_and_lag(parts, LEAST_INEFFICIENCY)
@@ -223,17 +193,11 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
     """Return standard error of the mean and degrees of freedom of an anticorrelated series (T,).
 
-    The running sum of an anticorrelated series contains a bounded part, which fluctuates but does
-    not grow with the length of the series.  For example, the running sum of the impulses on two
-    opposite walls contains the momentum of the disks between the walls, which is bounded.  The
-    values of the bounded part at the start and at the end of the series contribute to the variance
-    of the mean.  To the squared coefficients of a cosine transform, the bounded part contributes
-    twice as much as to the variance of the mean.  To the squared coefficients of a Fourier
-    transform, averaged over sines and cosines, the bounded part contributes exactly as much as to
-    the variance of the mean.  The spectral density of the bounded part increases as the square of
-    the frequency, and therefore coefficients of higher frequency would increase the bias of the
-    mean.  For a small inefficiency `per_sample` fewer coefficients are used, such that the relative
-    bias is constant.
+    The running sum of such a series is bounded, as the momentum between two walls whose impulses
+    are added. To the power of a Fourier transform its ends contribute as much as to the variance of
+    the mean, to that of a cosine transform twice as much. The power rises as the square of the
+    frequency; fewer coefficients for a small inefficiency `per_sample` keep the relative bias
+    constant.
     """
     most = min(MOST_WAVES, len(parts) // 2) // 2
     pairs = int(np.clip(round(len(parts) * per_sample**0.5 / (2 * PER_WAVE)), 1, max(1, most)))
@@ -244,9 +208,8 @@ def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
 def equilibration(series: np.ndarray) -> int:
     """Return the number of samples before a series becomes stationary.
 
-    The function returns twice the number of initial samples that White's rule (MSER) discards
-    (White, Simulation 69, 323 (1997)).  White's rule minimises the standard error of the mean of
-    the remaining samples.
+    It is twice the number discarded by White's rule (MSER), which minimises the standard error of
+    the mean of the remaining samples (White, Simulation 69, 323 (1997)).
 
     Parameters
     ----------
@@ -272,22 +235,21 @@ def equilibration(series: np.ndarray) -> int:
 
 
 def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
-    """Combine the means of independent runs into one mean.
+    """Average the means of independent runs.
 
-    The error of the combined mean follows from the errors of the runs.  If the means of the runs
-    scatter by more than their errors explain, or if a run has no error, the error of the combined
-    mean follows from the scatter of the means.
+    The error is calculated from those of the runs. If the means scatter by more than these explain,
+    or if a run has no error, it is calculated from the scatter.
 
     Parameters
     ----------
     means : sequence of SeriesMean
-        (R,) the means of the runs
+        (R,) means of the runs
 
     Returns
     -------
     SeriesMean
-        the mean of the means; its attribute `samples` is the sum of the attributes of the runs or,
-        if the error follows from the scatter, the number of runs
+        the average; `samples` is the sum over the runs, or the number of runs for an error from
+        scatter
 
     Examples
     --------
@@ -323,47 +285,15 @@ def scatter_p(means: Sequence[SeriesMean]) -> float:
 
 
 def has_drift(mean: SeriesMean) -> bool:
-    """Determine whether a series drifts by more than chance explains.
-
-    Parameters
-    ----------
-    mean : ricochet.statistics.SeriesMean
-        the mean of the series
-
-    Returns
-    -------
-    bool
-        whether a drift of at least the measured size would occur by chance with a probability below
-        `UNLIKELY`
-
-    Examples
-    --------
-    >>> has_drift(SeriesMean(1.0, 0.1, 50, 1.0)), has_drift(SeriesMean(1.0, 0.1, 50, 4.0))
-    (False, True)
-    """
+    """Return whether a drift of at least this size has a probability below `UNLIKELY` by chance."""
     return bool(2 * scipy.special.ndtr(-abs(mean.drift)) < UNLIKELY)
 
 
 def has_trend(series: np.ndarray) -> bool:
-    """Determine whether a straight line explains most of the variance of a series.
+    """Return whether a straight line explains more than 75 % of the variance of a series (T,).
 
-    For a series that is nearly a straight line, the function `correlated_mean` finds no significant
-    drift, because the function interprets the trend as a long autocorrelation.
-
-    Parameters
-    ----------
-    series : numpy.ndarray
-        (T,) samples at equal intervals
-
-    Returns
-    -------
-    bool
-        whether the squared correlation coefficient of the series and time exceeds 0.75
-
-    Examples
-    --------
-    >>> has_trend(np.arange(100.0)), has_trend(np.cos(np.arange(100.0)))
-    (True, False)
+    For such a series `correlated_mean` finds no drift: it takes the trend for a long
+    autocorrelation.
     """
     if len(series) < FEWEST or np.ptp(series) <= 1e-9 * np.max(np.abs(series)):
         return False
@@ -371,25 +301,7 @@ def has_trend(series: np.ndarray) -> bool:
 
 
 def diagnostics(name: str, means: Sequence[SeriesMean]) -> list[str]:
-    """Return the reasons why a mean over runs may be unreliable.
-
-    Parameters
-    ----------
-    name : str
-        name of the quantity in the returned sentences
-    means : sequence of SeriesMean
-        (R,) the means of the runs
-
-    Returns
-    -------
-    list of str
-        a sentence for each reason; an empty list if the mean is reliable
-
-    Examples
-    --------
-    >>> diagnostics("Z", [SeriesMean(1.0, 0.1, 5.0, 0.0)])
-    ['Z: worth only 5.0 independent samples; run longer']
-    """
+    """Return sentences on why the mean of the quantity `name` over runs may be unreliable."""
     found, whole = [], combine_runs(means)
     if np.isnan(whole.error):
         return [f"{name}: no error, a run has fewer than {FEWEST} samples in equilibrium"]
@@ -423,13 +335,12 @@ def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarr
     Returns
     -------
     middle, mean : numpy.ndarray
-        (W,) centres of the windows that contain samples, and means over these windows; an
-        incomplete last window is left out
+        (W,) centres and means of the complete windows that contain samples
 
     Raises
     ------
     ValueError
-        if the number of windows would exceed a million
+        if there would be more than a million windows
 
     Examples
     --------

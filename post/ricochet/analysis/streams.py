@@ -1,15 +1,12 @@
 """Stream function of the mean flow of disks in a steady state.
 
-In a steady state the flux of disks j, their number that passes per length and time, has no
-divergence.  Therefore a stream function psi exists, with j_x = d psi / dy and j_y = -d psi / dx.
-The contour lines of psi are the streamlines of the mean flow.  The difference of psi between two
-points is the number of disks whose centres pass between these points per unit of time.
+The flux of disks j (disks per length and time) then has no divergence, so that j_x = d psi / dy and
+j_y = -d psi / dx. Contour lines of psi are streamlines, and its difference between two points is
+the number of disks that pass between them per unit of time.
 
-The stream function minimises the integral of (j - j_psi)^2 over the box, where j_psi is the flux
-that follows from psi.  The minimum depends on j only through sums over disks of v times the
-gradients of the basis functions at the centres of the disks.  Therefore the flux is neither
-averaged over cells nor divided by an accessible area, and psi does not depend on the cells for
-which it is requested, as long as the finite elements are small.
+psi minimises the integral of (j - j_psi)^2 over the box, which depends on j only through sums over
+disks of v times the gradients of the basis functions. The flux is thus not averaged over cells, and
+psi does not depend on the requested cells as long as the finite elements are small.
 """
 
 from typing import NamedTuple
@@ -19,13 +16,12 @@ import scipy
 
 from ..reading.nature import Refused
 from ..reading.reader import Run
-from .estimates import Estimate
+from .estimates import Estimate, jackknife_of_sums
 from .fields import (
     FLOW_LEAST,
     Cells,
     block_correlation,
     blocks_of,
-    jackknife,
     own_motion,
     places,
 )
@@ -56,9 +52,8 @@ class Mesh(NamedTuple):
     def corners_of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the elements that contain points (P, 2) as nodes and functions at their corners.
 
-        The arrays (4, P) contain the numbers of the corners and the values of the basis functions
-        of the corners at the points.  The third array (4, 2, P) contains the derivatives of the
-        basis functions along x and y.
+        The first two arrays (4, P) contain the numbers of the corners and the values of their basis
+        functions at the points, the third (4, 2, P) the derivatives along x and y.
         """
         place = (points - self.run.lower) / self.size
         cell = np.clip(place.astype(int), 0, np.array(self.elements) - 1)
@@ -122,23 +117,22 @@ def stream_function(
     runs : list of Run
         (R,) runs of one input, which differ by their seed
     skip : float, optional
-        duration of the equilibration, in collisions per disk [the first half of each run]
+        collisions per disk that are left out [the first half of each run]
     cells : tuple of int
         numbers of cells along x and y
     species : str, optional
-        name of the species whose flux is measured [all disks]
+        species whose flux is measured [all disks]
 
     Returns
     -------
     StreamFunction
-        stream function at the corners and in the middles of the cells, which is 0 at the lower left
-        corner of the box and constant on each wall; the errors follow from the jackknife over
-        blocks of time
+        psi [1/time] at corners and middles of cells with jackknife errors, 0 at the lower left
+        corner and constant on each wall
 
     Raises
     ------
     Refused
-        if a run recycles disks, which leave the fluid in one region and enter it in another region
+        if a run recycles disks, whose flux has sources
 
     Examples
     --------
@@ -169,7 +163,7 @@ def stream_function(
     middles = np.sum(values[..., None] * psi[nodes], axis=0)
     frames = np.array([[float(len(block.frames))] for block in blocks])
     sums = np.hstack([np.vstack([corners.reshape(-1, len(blocks)), middles]).T, frames])
-    members = jackknife(lambda total: total[:-1] / total[-1], sums, frames)
+    members = jackknife_of_sums(lambda total: total[:-1] / total[-1], sums, frames)
     by_field = members._replace(values=members.values[:, None], share=members.share[:, None])
     near = block_correlation(by_field, blocks, most, np.array([FLOW_LEAST]))
     found = members.estimate(near)
@@ -193,11 +187,9 @@ def node_unknowns(
 ) -> tuple[int, scipy.sparse.csr_array]:
     """Return the number of unknowns, and the matrix that converts unknowns to psi at the nodes.
 
-    The unknowns are the values of psi at nodes that are not on walls, followed by one flux for each
-    periodic axis.  All periodic images of a node share one unknown.  Psi is constant on each wall,
-    and is 0 on the lower wall and on the left wall.  Without walls, psi is 0 at the lower left
-    corner.  The flux along a periodic axis through the whole box is, except for its sign, the
-    difference of psi between the two sides parallel to this axis.
+    The unknowns are psi at nodes not on walls, shared by periodic images, and one flux for each
+    periodic axis: apart from its sign the difference of psi between the sides parallel to this
+    axis. Psi is constant on walls, and 0 on the lower and left wall or at the lower left corner.
     """
     y, x = np.meshgrid(np.arange(rows + 1), np.arange(columns + 1), indexing="ij")
     fixed = (x % columns == 0) & (y % rows == 0) if np.all(periodic) else np.zeros(x.shape, bool)

@@ -1,7 +1,6 @@
 """Structure of a run: pair correlation, structure factor, clusters and bond order.
 
-The functions use SciPy only, because the available libraries for the analysis of structure support
-periodic boxes but not walls.
+Libraries for structure analysis support periodic boxes but not walls; only SciPy is used.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -37,7 +36,7 @@ def periods(run: Run) -> np.ndarray:
 
 
 def refuse(run: Run, *traits: str) -> None:
-    """Raise an error if the run has one of the given properties (traits of `nature`)."""
+    """Raise an error if the run has one of the given traits of `nature`."""
     law = "structure is found in boxes at rest" + ", S(k) in periodic ones" * ("walls" in traits)
     allow(run, law, *TRAITS.keys() - set(traits))
 
@@ -47,26 +46,24 @@ def pair_correlation(
 ) -> np.ndarray:
     """Return the pair correlation function g(r) averaged over frames.
 
-    g(r) is the density of disks at the distance r from a disk, divided by the mean density of the
-    box.  In a box with walls, which may move, distances r are measured only from disks that are far
-    from the walls.
+    g(r) is the density at the distance r from a disk over the mean density of the box. Between
+    walls, which may move, distances are measured only from disks far from the walls.
 
     Parameters
     ----------
     run : ricochet.Run
         a run in a box at rest
     frames : ricochet.arrays.Index
-        the frames: a number, a slice, or a list
+        a number, a slice or a list
     edges : numpy.ndarray
         (B + 1,) edges of the bins of r, in mean diameters
     pair : tuple of str, optional
-        names of two species, for g(r) of the second species around disks of the first species [all
-        disks]
+        two species, for g(r) of the second around disks of the first [all disks]
 
     Returns
     -------
     numpy.ndarray
-        (B,) g(r), or NaN if there are no pairs of disks
+        (B,) g(r), or NaN without pairs of disks
 
     Raises
     ------
@@ -109,21 +106,20 @@ def structure_factor(
 ) -> np.ndarray:
     """Return the structure factor ``S(k) = <|sum of exp(i k x)|^2> / N`` averaged over frames.
 
-    Only one of the wave vectors k and -k is used, because S(k) = S(-k).  If there are many disks,
-    only a part of the wave vectors is used.
+    One of k and -k is used, because S(k) = S(-k), and if there are many disks only some wave
+    vectors.
 
     Parameters
     ----------
     run : ricochet.Run
         a run in a periodic box
     frames : ricochet.arrays.Index
-        the frames: a number, a slice, or a list
+        a number, a slice or a list
     edges : numpy.ndarray
         (B + 1,) edges of the bins of k, in 1 / mean diameter
     pair : tuple of str, optional
-        names of two species; if two species are given, S(k) is the product of the sums of exp(i k
-        x) over the disks of each species, divided by the geometric mean of their numbers of disks
-        [all disks]
+        two species, for the product of their sums over the geometric mean of their numbers [all
+        disks]
 
     Returns
     -------
@@ -145,18 +141,15 @@ def structure_factor(
     unit = 2 * np.pi / run.edges  # the wave vectors are its multiples
     most = np.floor(edges[-1] / (2 * run.radius.mean()) / unit).astype(int)
     step = int(np.ceil(np.sqrt(2 * run.n_disks * np.prod(most + 1) / MOST_TERMS)))
-    along_x = step * np.arange(most[0] // step + 1)
-    along_y = step * np.arange(-(most[1] // step), most[1] // step + 1)
+    number_x, number_y = most // step
+    along_x, along_y = step * np.arange(number_x + 1), step * np.arange(-number_y, number_y + 1)
     k = np.hypot(*np.meshgrid(along_x * unit[0], along_y * unit[1], indexing="ij"))
     k *= 2 * run.radius.mean()
     both = masks(run, pair)
     sums, numbers = np.zeros(k.shape), chosen(run.n_frames, frames)
     for frame in numbers:
-        x, y = (run.position[frame] * unit).T
-        waves = [
-            np.exp(1j * np.outer(along_x, x[some])) @ np.exp(1j * np.outer(y[some], along_y))
-            for some in both
-        ]
+        x, y = (run.position[frame] * unit * step).T
+        waves = [sums_of_waves(x[some], y[some], number_x, number_y) for some in both]
         sums += (waves[0] * waves[-1].conj()).real
     sums /= np.sqrt(both[0].sum() * both[-1].sum()) * len(numbers)
     sums[(along_x[:, None] == 0) & (along_y <= 0)] = np.nan  # one of k and -k
@@ -166,22 +159,44 @@ def structure_factor(
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
 
+def sums_of_waves(x: np.ndarray, y: np.ndarray, most_x: int, most_y: int) -> np.ndarray:
+    """Return the sums of exp(i (m x + n y)) for m = 0 to `most_x` and n = -`most_y` to `most_y`."""
+    parts = [
+        np.ascontiguousarray(part)  # of strided parts, matrix products would be slow
+        for phase, most in ((x, most_x), (y, most_y))
+        for waves in [powers(phase, most)]
+        for part in (waves.real, waves.imag)
+    ]
+    cos_x, sin_x, cos_y, sin_y = parts
+    cc, ss = cos_x @ cos_y.T, sin_x @ sin_y.T
+    sc, cs = sin_x @ cos_y.T, cos_x @ sin_y.T
+    above, below = cc - ss + 1j * (sc + cs), cc + ss + 1j * (sc - cs)
+    return np.concatenate([below[:, :0:-1], above], axis=1)
+
+
+def powers(phase: np.ndarray, most: int) -> np.ndarray:
+    """Return exp(i m phase) for m = 0 to `most`, which products give faster than exponentials."""
+    factors = np.ones((most + 1, len(phase)), dtype=complex)
+    factors[1:] = np.exp(1j * phase)
+    return np.cumprod(factors, axis=0)
+
+
 def evenly(run: Run, frames: Index = slice(None), most: int = 50) -> list[int]:
     """Select frames that are nearly equally spaced in time.
 
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
     frames : ricochet.arrays.Index
-        frames from which to select [all]
+        frames from which to select
     most : int
-        largest number of frames to return
+        largest number of frames
 
     Returns
     -------
     list of int
-        numbers of the selected frames, in increasing order
+        numbers of the frames, in increasing order
 
     Examples
     --------
@@ -206,8 +221,7 @@ def averaged(
     Parameters
     ----------
     of : callable
-        function, such as `pair_correlation`, that takes a run, frames, edges and `more`, and
-        returns an array (B,)
+        function such as `pair_correlation` of a run, frames, edges and `more`, which returns (B,)
     runs : sequence of Run
         (R,) runs that differ by their seed
     frames : sequence of Index
@@ -220,8 +234,8 @@ def averaged(
     Returns
     -------
     Curve
-        centres of the bins with values, means and errors; the errors follow from the scatter of the
-        runs or, for a single run, from the autocorrelation over its frames
+        centres of the bins, means, and errors from the scatter of the runs or, for a single run,
+        from the autocorrelation of its frames
 
     Examples
     --------
@@ -249,23 +263,21 @@ def largest_cluster(run: Run, frame: int, gap: float) -> int: ...
 @overload
 def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray: ...
 def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
-    """Return the number of disks in the largest cluster.
-
-    Disks belong to one cluster if a chain of disks with gaps below `gap` connects them.
+    """Return the number of disks in the largest cluster, a set connected by gaps below `gap`.
 
     Parameters
     ----------
     run : ricochet.Run
         a run in a box at rest
     frame : ricochet.arrays.Index
-        number of a frame, or index of several frames
+        number of a frame, or index of several
     gap : float
         largest gap between the rims of neighbouring disks [length]
 
     Returns
     -------
     int or numpy.ndarray
-        the number of disks, as an array (F,) for several frames
+        the number of disks, (F,) for several frames
 
     Examples
     --------
@@ -295,15 +307,14 @@ def bond_order(run: Run, frame: Index) -> np.ndarray:
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
     frame : ricochet.arrays.Index
-        number of a frame, or index of several frames
+        number of a frame, or index of several
 
     Returns
     -------
     numpy.ndarray
-        (N,) complex numbers, or (F, N) for several frames; the modulus is 1 if a disk has six
-        neighbours at equal angles
+        (N,) or (F, N) complex numbers, of modulus 1 for six neighbours at equal angles
 
     Examples
     --------
@@ -337,16 +348,16 @@ def bond_correlation(
 ) -> np.ndarray:
     """Return the correlation function g6(r) = Re <psi6*(0) psi6(r)> of bond order.
 
-    If there are many disks, distances r are measured only from a part of the disks.
+    If there are many disks, distances r are measured only from some of them.
 
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
     frames : ricochet.arrays.Index
         frames to use
     psi : sequence of numpy.ndarray
-        (F, N) result of `bond_order` for each of the frames
+        (F, N) result of `bond_order` for these frames
     edges : numpy.ndarray
         (B + 1,) edges of the bins of r, in mean diameters
 

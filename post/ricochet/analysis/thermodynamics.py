@@ -1,9 +1,8 @@
 """Pressure, collision rates and temperature of runs in equilibrium, with errors.
 
-The pressure P can be measured in three independent ways: from the virial of the pair collisions,
-from the collision rate of equal disks, and from the force on the sides.  The compressibility factor
-is Z = P / (n kT).  If the kinetic energy is conserved, kT is exact; otherwise kT is a mean over
-time.  The docstring of the module `equilibrium` describes the parameter `skip`.
+The pressure P is measured in three independent ways: from the virial of the pair collisions, from
+the collision rate of equal disks, and from the force on the sides. The compressibility factor is Z
+= P / (n kT). The module `equilibrium` explains the parameter `skip`.
 """
 
 from typing import NamedTuple
@@ -29,27 +28,20 @@ from .statistics import FEWEST, FINE, SeriesMean, correlated_mean
 __all__ = [
     "collision_rate",
     "frames_from",
-    "free_disks",
     "kt_at_start",
-    "mean_energy",
     "mean_free_time",
     "packing",
-    "pair_rates",
-    "pressures",
     "rates",
     "start_of_equilibrium",
     "start_of_steady_state",
     "temperature",
-    "z_rate",
-    "z_virial",
-    "z_wall",
     "z_ways",
 ]
 
-TIMED = ("every_time", "at", "per_decade")  # samples are taken at times, not after collisions
+TIMED = ("every_time", "at", "per_decade")  # schedules by time, not by collisions
 MANY = 1e8  # number of disks above which the effect of a fixed energy is negligible
-# Properties (traits of `nature`) of runs to which an equation of state applies. A run with none of
-# the traits of `nature` consists of equal smooth disks with conserved energy in a periodic box.
+# Traits of `nature` of runs to which an equation of state applies. A run without any traits
+# consists of equal smooth disks with conserved energy in a periodic box.
 FLUID = ("walls", "thermal_walls", "thermostatted", "rough", "rotating", "mixture")
 
 
@@ -70,16 +62,15 @@ class Steps(NamedTuple):
 def temperature(run: Run, skip: float | None = None) -> SeriesMean:
     """Estimate kT in equilibrium.
 
-    Samples that are taken after equal numbers of collisions are more frequent while a gas is hot,
-    because the collision rate is proportional to sqrt(kT).  In the mean over samples that are taken
-    after equal numbers of collisions, each sample is therefore weighted with 1 / sqrt(kT).
+    Samples at equal numbers of collisions are more frequent while a gas is hot, because its
+    collision rate is proportional to sqrt(kT). They are therefore weighted with 1 / sqrt(kT).
 
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        a run in equilibrium
     skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
+        collisions per disk that are left out [until no observable drifts]
 
     Returns
     -------
@@ -117,29 +108,9 @@ def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
-    """Estimate the mean kinetic energy of a disk of a given mass in equilibrium.
+    """Estimate the mean kinetic energy of a disk with a given mass in equilibrium, without gravity.
 
-    The run must not have gravity.
-
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-    mass : float
-        mass of the disk
-    skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
-
-    Returns
-    -------
-    SeriesMean
-        mean kinetic energy, which is smaller than kT if the total momentum is conserved
-
-    Examples
-    --------
-    >>> mean = thermodynamics.mean_energy(run, 1.0).mean
-    >>> bool(np.isclose(mean, run.kinetic_energy(-1).mean()))
-    True
+    It is smaller than kT if the total momentum is conserved.
     """
     bound = (run.n_disks - free_disks(run)) * mass / run.mass.sum()
     moving = 0.5 * mass * float(np.sum(drift(run) ** 2))
@@ -155,7 +126,7 @@ def packing(run: Run) -> float:
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
 
     Returns
     -------
@@ -192,7 +163,7 @@ def mean_free_time(run: Run, start: float = 0.0) -> float:
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        any run
     start : float
         time after which collisions are counted
 
@@ -247,18 +218,17 @@ def steps(run: Run, skip: float | None = None) -> Steps:
 
 
 def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series; the ratio of their means is the rate of `amount` divided by kT^power.
+    """Return two series whose means have as their ratio the rate of `amount` divided by kT^power.
 
-    The second series includes the factor kT^power, expanded to first order in the deviations of kT
-    from its mean.  If the error of the ratio of the means is estimated from both series, it
-    includes the correlation between `amount` and kT.
+    The second series is kT^power to first order in the deviations of kT from its mean, so that the
+    error of the ratio includes the correlation between `amount` and kT.
     """
     kt = float(np.average(s.kt, weights=s.time))
     return amount * kt**-power, s.time * (1 + power * (s.kt / kt - 1))
 
 
 def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series, calculated from the virial; the ratio of their means is Z - 1."""
+    """Return two series, calculated from the virial, whose means have the ratio Z - 1."""
     s = steps(run, skip)
     return over_kt(s.virial / (2 * run.n_disks), s, 1)
 
@@ -269,9 +239,9 @@ def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        a run in equilibrium
     skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
+        collisions per disk that are left out [until no observable drifts]
 
     Returns
     -------
@@ -294,60 +264,12 @@ def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
-    """Estimate Z = P / (n kT) from the virial of the pair collisions.
-
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-    skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
-
-    Returns
-    -------
-    SeriesMean
-        compressibility factor Z
-
-    Raises
-    ------
-    Refused
-        if the run does not reach equilibrium
-
-    Examples
-    --------
-    >>> z = thermodynamics.z_virial(run)
-    >>> bool(abs(z.mean - hard_disks.henderson(0.3)) < 0.3)
-    True
-    """
+    """Estimate Z from the virial of the pair collisions; raise Refused without equilibrium."""
     return correlated_mean(*virial_over_kt(run, skip)).scaled(1.0, 1.0)
 
 
 def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
-    """Estimate Z = P / (n kT) from the collision rate of equal disks.
-
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-    skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
-
-    Returns
-    -------
-    SeriesMean
-        compressibility factor Z
-
-    Raises
-    ------
-    Refused
-        if the run does not reach equilibrium
-
-    Examples
-    --------
-    >>> z = thermodynamics.z_rate(run)
-    >>> bool(abs(z.mean - hard_disks.henderson(0.3)) < 0.3)
-    True
-    """
+    """Estimate Z from the collision rate of equal disks; raise Refused without equilibrium."""
     s = steps(run, skip)
     turning = run.n_disks / 2 if run.nature & {"rough", "rotating"} else 0.0
     share = free_disks(run) + turning if run.nature.keeps_energy else MANY  # a fixed energy
@@ -356,30 +278,10 @@ def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
-    """Estimate Z = P / (n kT) from the force of equal disks on four walls.
+    """Estimate Z = P A / (N kT) from the force of equal disks on four walls.
 
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-    skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
-
-    Returns
-    -------
-    SeriesMean
-        Z = P A / (N kT), where A is the area accessible to the centres of the disks
-
-    Raises
-    ------
-    Refused
-        if the run does not reach equilibrium
-
-    Examples
-    --------
-    >>> z = thermodynamics.z_wall(walled_run)
-    >>> bool(1 < z.mean < 4)
-    True
+    A is the area accessible to the centres. Refused is raised if the run does not reach
+    equilibrium.
     """
     s = steps(run, skip)
     a = run.edges - 2 * run.radius[0]
@@ -393,15 +295,14 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        a run in equilibrium
     skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
+        collisions per disk that are left out [until no observable drifts]
 
     Returns
     -------
     dict of str to SeriesMean
-        Z for each method; the keys are "virial", for equal disks also "rate", and "walls" if the
-        box has four walls
+        Z by method: "virial", "rate" for equal disks, and "walls" for a box with four walls
 
     Raises
     ------
@@ -410,8 +311,9 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
     Examples
     --------
-    >>> sorted(thermodynamics.z_ways(run))
-    ['rate', 'virial']
+    >>> ways = thermodynamics.z_ways(run)
+    >>> sorted(ways), bool(abs(ways["rate"].mean - hard_disks.henderson(0.3)) < 0.3)
+    (['rate', 'virial'], True)
     """
     allow(run, "it has no equation of state", *FLUID)
     walled = not run.periodic.any() and np.ptp(run.radius) == 0
@@ -421,29 +323,9 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """Estimate the pressure from the virial, and from the force on each wall of the box.
+    """Return "pressure_virial" and the pressure on each wall, "pressure_left" and so on.
 
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-    skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
-
-    Returns
-    -------
-    dict of str to SeriesMean
-        pressures [energy/length^2], with the keys "pressure_virial", "pressure_left" and so on
-
-    Raises
-    ------
-    Refused
-        if the run does not reach equilibrium
-
-    Examples
-    --------
-    >>> sorted(thermodynamics.pressures(run))
-    ['pressure_virial']
+    The unit is energy/length^2. Refused is raised if the run does not reach equilibrium.
     """
     s = steps(run, skip)
     inside = correlated_mean(run.n_disks * s.kt * s.time + s.virial / 2, s.time)
@@ -461,29 +343,9 @@ def has_log(run: Run) -> bool:
 
 
 def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """Estimate the collision rates between species from the event log.
+    """Return collision rates "w_A_B" of a disk of species A with species B [1/time].
 
-    Parameters
-    ----------
-    run : ricochet.Run
-        the run to analyse
-    skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
-
-    Returns
-    -------
-    dict of str to SeriesMean
-        "w_A_B": collision rate of a disk of species A with disks of species B [1/time]
-
-    Raises
-    ------
-    RunError
-        if the run has no event log
-
-    Examples
-    --------
-    >>> sorted(thermodynamics.pair_rates(run))
-    ['w_gas_gas']
+    RunError is raised without an event log.
     """
     log, species = run.event_log(), run.species - 1
     cuts = np.linspace(start_of_equilibrium(run, skip), run.time[-1], FINE + 1)
@@ -505,14 +367,14 @@ def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     Parameters
     ----------
     run : ricochet.Run
-        the run to analyse
+        a run in equilibrium
     skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
+        collisions per disk that are left out [until no observable drifts]
 
     Returns
     -------
     dict of str to SeriesMean
-        temperature, pressures and collision rates, with their names as keys
+        the quantities by name
 
     Raises
     ------

@@ -1,35 +1,16 @@
 """Transport coefficients: viscosities, thermal conductivity and diffusion coefficients.
 
-The functions for diffusion require equally spaced frames, and each lag is given as a number of
-frames.  In the functions for diffusion, the argument `frames` contains the frames in equilibrium.
-The integral of <v(0) v(t)> requires no sum over frames, because the integral of v is the
-displacement x(t) - x(0), which is exact for any interval between frames (see `correlations`).
-
-Viscosities and conductivity follow from Einstein-Helfand relations.  A Helfand moment is the time
-integral of the total flux of momentum or energy.  In free flight, a disk contributes m v_a v_b to
-the flux of momentum and (m v^2 / 2) v to the flux of energy.  A collision transfers the momentum
-dP_a and the energy dE over the distance r = x_i - x_j.  Like a mean square displacement, the mean
-square of a Helfand moment grows linearly in time.  Let s be the slope of the mean square as a
-function of time, and A the area of the box.  The viscosities are s / (2 A kT), and the conductivity
-is s / (2 A kT^2).  See Helfand, Physical Review 119, 1 (1960), and Alder, Gass and Wainwright,
-Journal of Chemical Physics 53, 3813 (1970).  If `output.helfand` is true, the program accumulates
-the Helfand moments exactly, and writes them as observables.
-
-The viscosities of a mixture follow from the stress of all disks together.  The conductivity of a
-mixture does not follow from the energy moment alone, because diffusing species transport their
-enthalpy.  If disks dissipate energy, or if noise supplies energy, fluctuations do not determine the
-transport coefficients.  In the theory of a cooling gas, the moments are correlated with other
-quantities that depend on the unknown distribution of states of the gas (Baskaran, Dufty and Brey,
-Physical Review E 77, 031311 (2008)).  If noise drives the disks, the fluctuation-dissipation
-theorem does not hold.  An error is raised for rough disks, because the moments do not include the
-rotational energy that rough disks transport.
+Viscosities and conductivity are calculated from Helfand moments, which docs/explanation/laws.md
+explains; rough disks are refused, because the moments do not include the rotational energy that
+they transport. Diffusion coefficients are calculated from displacements in equally spaced frames:
+the integral of <v(0) v(t)> needs no sum over frames, since the integral of v is the displacement.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from ..predictions import hard_disks
+from ..predictions import hard_disks, mixtures
 from ..reading.files import RunError
 from ..reading.nature import allow
 from ..reading.reader import Run
@@ -42,15 +23,14 @@ from .statistics import SeriesMean, correlated_mean
 __all__ = [
     "Found",
     "coefficients",
-    "enskog_of",
 ]
 
 PER_FREE_TIME = 4  # sufficient number of samples of the moments
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
 # HEAT is the decay time of the heat flux in a dilute gas of equal disks, in mean free times; in a
-# denser gas this decay time is shorter. MEMORY is the lag, in mean free times, at which transport
-# coefficients are evaluated. Between the lags MEMORY / 2 and MEMORY, the slope of the mean square
-# of a moment is on average less than 0.2 % below the slope at infinite lag.
+# denser gas it is shorter. MEMORY is the lag, in mean free times, at which transport coefficients
+# are evaluated. Between MEMORY / 2 and MEMORY, the slope of the mean square of a moment is on
+# average less than 0.2 % below that at infinite lag.
 HEAT, MEMORY = 2.06, 20.0
 CLOSE = 1e-6  # relative difference of steps that are regarded as equal
 UNLIKE = 0.05  # largest relative difference of Enskog's viscosity between runs of one group
@@ -78,10 +58,9 @@ def lags(frames: int, per_decade: int = 12) -> np.ndarray:
 
 
 def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions (T, N, 2), which are not wrapped into the box, and velocities (T, N, 2).
+    """Return unwrapped positions (T, N, 2) and velocities (T, N, 2).
 
-    Along axes where the velocity of the centre of mass is conserved, positions and velocities are
-    relative to the centre of mass.
+    They are relative to the centre of mass along axes where its velocity is conserved.
     """
     kept = comoving(run)
     place, velocity = (
@@ -92,10 +71,9 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 
 
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
-    """Return the lag, in numbers of frames, in which sound crosses the box.
+    """Return the lag, in frames, in which sound crosses the box; at most 1/8 of the shortest run.
 
-    At lags longer than the time in which sound crosses the box, the size of the box influences
-    diffusion.  The returned lag is at most an eighth of the shortest run.
+    At longer lags the size of the box affects diffusion.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
     kt = td.temperature(run).mean
@@ -104,24 +82,26 @@ def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
     return int(np.clip(crossing, 2, max(2, shortest // 8)))
 
 
-def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean]:
-    """Estimate the diffusion coefficient D from displacements and from velocities.
+def diffusion(run: Run, frames: slice, lag: int, *species: str) -> list[tuple[SeriesMean, ...]]:
+    """Return two estimates of the diffusion coefficient D for all disks and for each species.
 
-    The first estimate is a quarter of the slope d<r^2>/dt of the mean square displacement, averaged
-    over the lags from `lag` / 2 to `lag`.  The second estimate is the mean of I(t) / 2 over the
-    lags t from `lag` / 2 to `lag`, where I(t) is the integral of <v(0) v> from 0 to t.  For each
-    estimate, every frame at which an interval of the length `lag` can start yields one value of a
-    series; the error of the mean of the series includes the correlations between the values.
-    Between frames, I(t) is interpolated by a cubic curve with the known slopes <v(0) v(t)>. If the
-    velocity autocorrelation decays exponentially, the interpolation changes D by at most 0.2 %, and
-    by far less at lags where D(t) is constant.
+    The first is a quarter of the slope of the mean square displacement over the lags from `lag` / 2
+    to `lag`, in frames. The second is the mean over these lags of half the integral of <v(0) v>,
+    which is interpolated between frames by a cubic curve with the known slopes; for an exponential
+    decay this changes D by at most 0.2 %. Both errors include correlations between starting frames.
     """
-    step, half = float(run.time[1] - run.time[0]), lag // 2
-    x, v = motion(run, frames)
-    origins = len(x) - lag
+    place, velocity = motion(run, frames)
+    disks = [run.mass > 0, *(run.of_species(name) for name in species)]
+    step = float(run.time[1] - run.time[0])
+    return [of_paths(place[:, own], velocity[:, own], step, lag) for own in disks]
+
+
+def of_paths(x: np.ndarray, v: np.ndarray, step: float, lag: int) -> tuple[SeriesMean, ...]:
+    """Return both estimates of D for disks with positions and velocities (T, N, 2)."""
+    origins, half = len(x) - lag, lag // 2
     near, far = (np.sum((x[k : k + origins] - x[:origins]) ** 2, axis=2) for k in (half, lag))
     spread = (far - near).mean(axis=1) / (4 * step * (lag - half))
-    area = np.cumsum(x, axis=0) - x / 2 - step / 12 * v  # integral of x over time in steps
+    area = np.cumsum(x, axis=0) - x / 2 - step / 12 * v  # integral of x over time, in steps
     mean = (area[lag : lag + origins] - area[half : half + origins]) / (lag - half)
     memory = np.sum(v[:origins] * (mean - x[:origins]), axis=2).mean(axis=1) / 2
     return correlated_mean(spread), correlated_mean(memory)
@@ -131,13 +111,12 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
 
 
 def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
-    """Return the sampling interval and the Helfand moments after a given time.
+    """Return the sampling interval, and the Helfand moments relative to the centre of mass.
 
-    The mean growth of each moment in time is subtracted, so that the first and the last value of
-    the moment are 0.  The moments (T, C) for the viscosity are the momentum moments xy and (xx -
-    yy) / 2, the moment for the bulk viscosity is (xx + yy) / 2, and the moments for the
-    conductivity are the energy moments x and y.  All Helfand moments are relative to the centre of
-    mass.  If the run contains no moments at equal intervals, RunError is raised.
+    The momentum moments have the components xy and (xx - yy) / 2 for the shear viscosity, and (xx +
+    yy) / 2 for the bulk viscosity. The energy moment has the components x and y. Each moment has
+    the shape (T, C), and its mean growth is subtracted. RunError is raised if there are no moments
+    at equal intervals after `start`.
     """
     allow(run, TAKES, "mixture")
     if "helfand_heat" not in run.observables:
@@ -152,9 +131,9 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
         )
     flown, handed, heat, heat_handed = (part.value[first:-1] for part in parts)
     momentum = (flown + handed).reshape(-1, 2, 2)
-    # To convert the energy moments to the frame of the centre of mass, the velocity of the centre
-    # of mass times the momentum moment is subtracted. All other terms of the conversion grow
-    # linearly in time, so that the subtraction of the mean growth removes these terms.
+    # To convert the energy moments to the frame of the centre of mass, its velocity times the
+    # momentum moment is subtracted. All other terms of the conversion grow linearly in time, and
+    # are removed with the mean growth.
     heat = heat + heat_handed - np.einsum("a,tab->tb", drift(run), momentum)
     xx, xy, yy = momentum[:, 0, 0], momentum[:, 0, 1], momentum[:, 1, 1]
     groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
@@ -167,30 +146,29 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
 
 
 def squares(moment: np.ndarray, lag: int) -> np.ndarray:
-    """Return squares (T - lag,) of the increments of a moment (T, C) over `lag` samples.
+    """Return the squared change of a Helfand moment during a lag, averaged over its components.
 
-    The squared increments are averaged over the C components of the moment.  The mean growth that
-    is subtracted from a moment was estimated from the same series; therefore the squares are too
-    small by the fraction lag / (T - 1).  The returned squares are corrected for the subtraction of
-    the mean growth.
+    The moment has the shape (T, C), and the result (T - lag,). Subtracting the mean growth, as
+    `moments` does, reduces the squares by the fraction lag / (T - 1) on average. The result is
+    corrected for this.
     """
     gain = moment[lag:] - moment[: len(moment) - lag]
     return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))
 
 
 def running(moment: np.ndarray, step: float, at: np.ndarray) -> np.ndarray:
-    """Return half the slope of the mean squared increment of a moment between successive lags."""
+    """Return half the slope of the mean squared change of a moment, between successive lags."""
     mean = np.array([squares(moment, lag).mean() for lag in at])
     return np.diff(mean, prepend=0) / np.diff(at, prepend=0) / (2 * step)
 
 
 def relative_error(samples: int, lag: int) -> float:
-    """Return the relative standard error of a coefficient that one component of a moment yields.
+    """Return the relative standard error of a coefficient from one component of a moment.
 
-    The moment has `samples` values and is a random walk, because the fluxes decay in a time much
-    shorter than `lag`.  The coefficient is then a quadratic form of independent Gaussian steps,
-    whose variance is known: the covariance of two squared increments is twice the square of the
-    number of steps that both have in common.
+    If `lag` is much longer than the decay time of the fluxes, the `samples` values of the moment
+    form a random walk, and the coefficient is a quadratic form of its Gaussian steps. The
+    covariance of two squared increments is then twice the squared number of steps that both
+    contain.
     """
     half, origins = lag // 2, samples - lag
     apart = np.arange(-lag, lag + 1)  # origin of the second increment minus that of the first
@@ -206,12 +184,10 @@ def relative_error(samples: int, lag: int) -> float:
 def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
     """Estimate a transport coefficient from the increments of a Helfand moment (T, C).
 
-    The estimate is half the slope of the mean squared increment, as a function of the lag, between
-    `lag` / 2 and `lag`.  Every sample at which an interval of the length `lag` can start yields one
-    value of a series.  Few of these values are independent, and their distribution is far from
-    Gaussian; an error that is estimated from the series is therefore too small on average.  The
-    error follows from `relative_error` instead, with C independent components.  Only the drift is
-    taken from the series.
+    It is half the slope of the mean squared increment between `lag` / 2 and `lag`. Each sample at
+    which such an interval starts yields a value. These values are too few and too far from Gaussian
+    for an error, which is that of `relative_error` for C components; only the drift is that of the
+    series.
     """
     half = lag // 2
     near, far = squares(moment, half), squares(moment, lag)
@@ -226,7 +202,7 @@ def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
 
 
 class Found(NamedTuple):
-    """A transport coefficient at one packing fraction, divided by the value in Enskog's theory."""
+    """A transport coefficient at one packing fraction, relative to Enskog's value."""
 
     members: list[SeriesMean]  # values of the runs
     curve: Curve  # against the lag, in mean free times
@@ -236,28 +212,10 @@ class Found(NamedTuple):
 
 
 def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
-    """Return the transport coefficients of Enskog's theory for the disks of a run.
+    """Return the transport coefficients of Enskog's theory for the disks of a run, by name.
 
-    Disks whose diameters and masses differ by less than 1 % are treated as one species.
-
-    Parameters
-    ----------
-    run : ricochet.Run
-        a run that conserves its kinetic energy
-    reduced : bool
-        whether the units are the mean mass, the mean diameter and kT, instead of the units of the
-        run
-
-    Returns
-    -------
-    dict of str to float
-        coefficients by name, as returned by `hard_disks.enskog` or, for a mixture, by
-        `hard_disks.enskog_mixture`
-
-    Examples
-    --------
-    >>> sorted(transport.enskog_of(run))
-    ['D', 'bulk_viscosity', 'conductivity', 'viscosity']
+    The energy of the run must be conserved. Disks that differ by less than 1 % in diameter and mass
+    are one species. If `reduced`, the units are the mean mass, the mean diameter and kT.
     """
     eta, kt = td.packing(run), 1.0 if reduced else td.kt_at_start(run)
     z, area = hard_disks.henderson(eta), float(np.prod(run.edges))
@@ -270,7 +228,7 @@ def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
     kinds = np.round(np.log([diameter, mass]), 2)
     _, which, count = np.unique(kinds, axis=1, return_inverse=True, return_counts=True)
     diameter, mass = (np.bincount(which.ravel(), one) / count for one in (diameter, mass))
-    return hard_disks.enskog_mixture(z, count / area, diameter, mass, kt)
+    return mixtures.enskog_mixture(z, count / area, diameter, mass, kt)
 
 
 def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
@@ -329,7 +287,8 @@ def of_displacements(runs: list[Run], starts: list[float]) -> Found:
     lag = diffusion_lag(runs, frames)
     at, pairs = lags(4 * lag), list(zip(runs, frames, strict=True))
     units = [1 / enskog_of(run)["D"] for run in runs]
-    members = [diffusion(*one, lag)[1].scaled(unit) for one, unit in zip(pairs, units, strict=True)]
+    each = zip(pairs, units, strict=True)
+    members = [diffusion(*one, lag)[0][1].scaled(unit) for one, unit in each]
     slopes = []
     for (run, own), unit in zip(pairs, units, strict=True):
         time = run.time[own]
@@ -341,20 +300,20 @@ def of_displacements(runs: list[Run], starts: list[float]) -> Found:
 
 
 def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]:
-    """Measure the transport coefficients of runs, divided by the values in Enskog's theory.
+    """Measure the transport coefficients of runs, relative to Enskog's values.
 
     Parameters
     ----------
     runs : list of Run
         (R,) runs of one system, with `output.helfand`
     skip : float, optional
-        duration of the equilibration, in collisions per disk [until no observable drifts]
+        collisions per disk that are left out [until no observable drifts]
 
     Returns
     -------
     dict of str to Found
-        coefficients, with the keys "viscosity" and "bulk_viscosity", for equal disks also
-        "conductivity", and "D" if the runs contain frames
+        "viscosity" and "bulk_viscosity", "conductivity" for equal disks, and "D" if there are
+        frames
 
     Raises
     ------

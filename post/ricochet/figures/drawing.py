@@ -23,7 +23,7 @@ from ..analysis.estimates import Estimate, kurtosis_noise
 from ..analysis.structure import bond_order, periods
 from ..reading.arrays import Index, as_index
 from ..reading.files import RunError, destination, did_you_mean
-from ..reading.nature import known, rows_of
+from ..reading.nature import known, rows_of, stays_in_box
 from ..reading.box import groups_of_rows
 from ..reading.reader import SIDES, Run
 
@@ -62,19 +62,24 @@ def caption(runs: list[Run]) -> str:
             values.setdefault(name, set()).add(value)
     chance = by_chance(runs)
     parts += [
-        f"{name} = {listed(own)}"
-        for name, own in values.items()
-        if len(own) > 1 and name not in chance
+        stated(name, own) for name, own in values.items() if len(own) > 1 and name not in chance
     ]
     seeds = {run.seed for run in runs}
     parts.append(f"seed {min(seeds)}" if len(seeds) == 1 else f"{len(seeds)} seeds")
     return "\n".join(wrap(",  ".join(parts), 110))
 
 
+def stated(name: str, values: set[float]) -> str:
+    """Return the values of a parameter as text; an event-driven run has no time step."""
+    steps = values - {0.0} if name == "dt" else values
+    parts = ["event-driven"] * (steps != values) + [f"{name} = {listed(steps)}"] * bool(steps)
+    return " and ".join(parts)
+
+
 def by_chance(runs: list[Run]) -> set[str]:
     """Return the names of packing fractions that differ only because radii are random.
 
-    They belong to species of random radii with the same number of disks, mean radius and region.
+    Their species have the same number of disks, mean radius and region.
     """
     given: dict[str, set[tuple[bool, str]]] = {}
     for run in runs:
@@ -87,10 +92,9 @@ def by_chance(runs: list[Run]) -> set[str]:
 
 
 def count_at(run: Run, frame: int) -> dict[str, int]:
-    """Return a dictionary with the number of events or collisions before a frame, if it is known.
+    """Return the number of events or collisions before a frame, by its name, if it is known.
 
-    The returned dictionary is empty if the number of frames shows that the schedule was changed
-    during the run.
+    It is unknown if the number of frames shows that the schedule was changed during the run.
     """
     schedule = run.parameters.get("output", {})
     counted = {"events": ["collisions", "side_collisions", "obstacle_collisions"]}
@@ -110,9 +114,11 @@ def moment(run: Run, frame: int) -> str:
 
 
 def titled(runs: list[Run]) -> str:
-    """Return the title of the first run, from its input, followed by the caption."""
-    title = str(runs[0].parameter("run", "title", ""))
-    return "\n".join(filter(None, (title, caption(runs))))
+    """Return the title from the input, if all runs have the same, followed by the caption."""
+    titles = {str(run.parameter("run", "title", "")) for run in runs}
+    return "\n".join(
+        filter(None, (*titles, caption(runs)) if len(titles) == 1 else [caption(runs)])
+    )
 
 
 def listed(values: set[float]) -> str:
@@ -176,9 +182,7 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
     """Return the upper end of the colour scale of a film: the 99.5 % quantile of the values.
 
-    If the colours show displacements, which grow with time, the quantile is computed from the
-    values in the last frame.  If the colours show any other quantity, the quantile is computed from
-    the values in about 40 frames.
+    It is that of about 40 frames, or of the last frame for displacements, which grow with time.
     """
     return top_of(sample_of(run, frames, colour))
 
@@ -190,12 +194,11 @@ def sample_of(run: Run, frames: Sequence[int], colour: str) -> np.ndarray:
 
 
 def top_of(values: np.ndarray) -> float:
-    """Return the upper end of a colour scale: the 99.5 % quantile of the absolute values.
+    """Return the upper end of a colour scale: the 99.5 % quantile of the absolute values except 0.
 
-    Values of 0 are not counted.  If all other values are equal, the result is twice their absolute
-    value, because the lightest colour of the scale is hardly visible on white.
+    If these are equal, it is twice their value: the lightest colour is hardly visible on white.
     """
-    moved = np.abs(values[values != 0])
+    moved = np.abs(values[(values != 0) & np.isfinite(values)])
     if len(moved) == 0:
         return 1.0
     top = float(np.quantile(moved, 0.995))
@@ -226,6 +229,8 @@ def chosen_colour(run: Run, wish: str | None) -> str:
         raise RunError(f"'{wish}' is not one of {', '.join(known)}{hint}")
     if wish == "collisions" and run.event_count is None:
         raise RunError(f"{run.path}: has no collisions per disk")
+    if wish == "psi6":
+        stays_in_box(run)
     if wish == "spin" and "angular_velocity" not in run.disk_data:
         raise RunError(
             f"{run.path}: its disks cannot rotate, or the frames do not contain their spins"
@@ -247,14 +252,16 @@ def lone(x: np.ndarray) -> dict[str, Any]:
 def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
     """Draw the sides of the box, the walls and the obstacles, with equal scales of both axes.
 
-    Periodic sides are dashed, other sides, walls and arcs are solid, and circles are grey.  Moving
-    sides are drawn at their positions at `time`, by default at their mean positions, and the area
-    beyond moving sides is grey.  Thermal and sliding walls are labelled.
+    Periodic sides are dashed, open sides dotted, circles grey, thermal and sliding walls labelled.
+    Moving sides are at their positions at `time` [mean positions], and the area beyond them is
+    grey.
     """
     low, high = run.bounds
     (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.corners_at(time)
     lines = [(x0, y0), (x0, y1)], [(x1, y0), (x1, y1)], [(x0, y0), (x1, y0)], [(x0, y1), (x1, y1)]
     styles = ["--" if periodic else "-" for periodic in np.repeat(run.periodic, 2)]
+    opens = run.open_at(run.time[0] if time is None else time)
+    styles = [":" if is_open else style for is_open, style in zip(opens, styles, strict=True)]
     sides: dict[str, Any]
     grey: dict[str, Any]
     sides, grey = {"linestyles": styles, "clip_on": False, "zorder": 3}, {"facecolor": "0.85"}
@@ -328,8 +335,9 @@ def name_walls(axes: Axes, run: Run) -> None:
 
 
 def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return indices and positions of all disks, and of periodic images that overlap the box."""
-    which, places = [np.arange(run.n_disks)], [position]
+    """Return indices and positions of all disks in the box, and of images that overlap the box."""
+    which = [np.flatnonzero(np.isfinite(position).all(axis=1))]
+    places = [position[which[0]]]
     for shift in periods(run):
         if shift.any():
             place = position + shift
@@ -350,10 +358,7 @@ def points_per_length(axes: Axes) -> float:
 
 
 def drawn_diameters(axes: Axes, run: Run) -> np.ndarray:
-    """Return the diameters (N,) with which disks are drawn.
-
-    Disks are drawn to scale, but disks that would be too small to be visible are enlarged.
-    """
+    """Return the diameters (N,) with which disks are drawn; tiny disks are enlarged."""
     apart = np.sqrt(np.prod(run.edges) / run.n_disks)
     least = min(LEAST_SHARE * apart, LEAST_POINTS / points_per_length(axes))
     return np.maximum(2 * run.radius, least)
@@ -368,9 +373,8 @@ def note_on_size(axes: Axes, run: Run) -> str:
 def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
     """Draw disks at `position` (N, 2), and their periodic images, with enlarged small disks.
 
-    The keyword argument `array` (N,) contains values that a colour map converts to colours, and
-    `facecolors` contains colours.  If disks are coloured by value, all species except the first
-    have a black outline, which is inside the disk.
+    `array` (N,) contains values for a colour map, or `facecolors` the colours. With values, all
+    species except the first have a black outline inside the disk.
     """
     which, places = with_images(run, position)
     diameters = drawn_diameters(axes, run)
@@ -433,11 +437,7 @@ def species_colours(run: Run) -> list[str]:
 
 
 def species_legend(figure: Figure, run: Run, by_outline: bool = False) -> None:
-    """Add a legend of the species below all panels if there are several species.
-
-    The legend distinguishes species by their colours or, if `by_outline` is true, by the outlines
-    that the function `disk_collection` draws.
-    """
+    """Add a legend below all panels if there are several species, by colour or `by_outline`."""
     styles = [{"color": COLOURS[k % len(COLOURS)]} for k in range(len(run.names))]
     if by_outline:
         styles = [{"mfc": "0.8", "mec": "black", "mew": 1.5 * (k > 0)} for k in range(len(styles))]

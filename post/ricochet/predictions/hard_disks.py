@@ -1,8 +1,7 @@
 """Published results for hard disks: equation of state, collision rates, cooling, diffusion.
 
-In this module, eta is the packing fraction, n the number of disks per area, s the diameter, m the
-mass, w the number of pair collisions per disk and time, and chi the pair correlation function at
-contact.  The compressibility factor is Z = P / (n kT).
+Symbols: eta packing fraction, n disks per area, s diameter, m mass, w pair collisions per disk and
+time, chi pair correlation function at contact, Z = P / (n kT) compressibility factor.
 """
 
 import math
@@ -18,19 +17,13 @@ from ..reading.reader import Restitution
 
 __all__ = [
     "collision_rate",
-    "contact_value",
     "crystal",
     "enskog",
-    "haff_by_collisions",
     "haff_by_time",
     "haff_rate",
     "henderson",
-    "long_time_tail",
     "noise_temperature",
-    "published",
     "simulated",
-    "simulated_finite",
-    "speed_of_sound",
 ]
 
 CLOSE_PACKING = math.pi / math.sqrt(12)
@@ -79,11 +72,7 @@ MELTING = {
 
 @cache
 def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
-    """Return splines of Z (1 - eta)^2 and of the coefficient c of Z_N = Z + c / N.
-
-    The product Z (1 - eta)^2 is interpolated instead of Z, because the product is smooth and close
-    to 1.
-    """
+    """Return splines of the smooth product Z (1 - eta)^2 and of c in Z_N = Z + c / N."""
     eta, z = np.concatenate([FLUID, FREEZING]).T
     smooth = scipy.interpolate.CubicSpline(np.append(0, eta), np.append(1, z * (1 - eta) ** 2))
     return smooth, scipy.interpolate.CubicSpline(
@@ -92,9 +81,7 @@ def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
 
 
 def henderson(eta: Number) -> Number:
-    """Return Henderson's compressibility factor Z = P / (n kT) of the fluid.
-
-    The formula is from Henderson, Molecular Physics 30, 971 (1975).
+    """Return Henderson's compressibility factor Z of the fluid, Molecular Physics 30, 971 (1975).
 
     Parameters
     ----------
@@ -104,7 +91,7 @@ def henderson(eta: Number) -> Number:
     Returns
     -------
     float or numpy.ndarray
-        compressibility factor Z
+        Z = P / (n kT)
 
     Examples
     --------
@@ -115,10 +102,10 @@ def henderson(eta: Number) -> Number:
 
 
 def simulated(eta: ArrayLike) -> np.ndarray:
-    """Return Z = P / (n kT) of the fluid, interpolated between simulations.
+    """Return Z of the fluid, interpolated between simulations.
 
-    Published simulations provide Z at packing fractions up to 0.648 and at 0.698; between these two
-    packing fractions, Z is from unpublished simulations with Ricochet.
+    The simulations are published up to a packing fraction of 0.648 and at 0.698; those in between
+    are unpublished ones with Ricochet.
 
     Parameters
     ----------
@@ -128,7 +115,7 @@ def simulated(eta: ArrayLike) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (...) Z, or NaN above 0.698, where the fluid freezes
+        (...) Z = P / (n kT), or NaN above 0.698, where the fluid freezes
 
     Examples
     --------
@@ -140,44 +127,24 @@ def simulated(eta: ArrayLike) -> np.ndarray:
 
 
 def simulated_finite(eta: ArrayLike, count: int) -> np.ndarray:
-    """Return Z = P / (n kT) of a fluid of `count` disks in a periodic box.
-
-    Parameters
-    ----------
-    eta : array_like
-        (...) packing fraction, up to 0.5
-    count : int
-        number of disks
-
-    Returns
-    -------
-    numpy.ndarray
-        (...) compressibility factor Z
-
-    Examples
-    --------
-    >>> bool(hard_disks.simulated_finite(0.3, 50) < hard_disks.simulated(0.3))
-    True
-    """
+    """Return Z (...) of a fluid of `count` disks in a periodic box, for eta (...) up to 0.5."""
     return simulated(eta) + splines()[1](eta) / count
 
 
 def crystal(eta: Number, count: float = math.inf) -> Number:
-    """Return Z = P / (n kT) of the crystal.
-
-    The formula is from Alder, Hoover and Young, Journal of Chemical Physics 49, 3688 (1968).
+    """Return Z of the crystal by Alder, Hoover and Young, J. Chem. Phys. 49, 3688 (1968).
 
     Parameters
     ----------
     eta : float or numpy.ndarray
         packing fraction
     count : float
-        number of disks in a periodic box with conserved total momentum [infinite]
+        number of disks in a periodic box with conserved total momentum
 
     Returns
     -------
     float or numpy.ndarray
-        compressibility factor Z
+        Z = P / (n kT)
 
     Examples
     --------
@@ -192,17 +159,13 @@ def crystal(eta: Number, count: float = math.inf) -> Number:
 def adiabat(
     widths: np.ndarray, height: float, count: int, radius: float, walled: bool
 ) -> np.ndarray:
-    """Return temperatures (W,) of a gas between two walls, one of which moves slowly.
+    """Return temperatures (W,) of a gas between two walls at slowly changing distances (W,).
 
-    The argument `widths` (W,) contains distances between the two walls.  The returned temperatures
-    are divided by the temperature at the distance `widths[0]`.  If `walled` is true, all four sides
-    of the box are walls, including the two sides parallel to the motion.  If `walled` is false, the
-    momentum along the moving wall is conserved, and the kinetic energy is (N - 1/2) kT instead of N
-    kT.  If F is the force of the gas on the moving wall, a change dw of the width changes the
-    kinetic energy by -F dw.  The force F is P h minus the tension of the two walls parallel to the
-    motion, where h is the height.  The pressure P follows from Z of the function `simulated`.
-    According to scaled particle theory a wall has the tension kT n r / (1 - eta) and a deficit of n
-    r (1 - eta) / (1 + eta) disks per length (Helfand, Frisch and Lebowitz, Journal of Chemical
+    They are relative to that at `widths[0]`. If the other two sides are not `walled`, momentum
+    along them is conserved, and the kinetic energy is (N - 1/2) kT instead of N kT. It changes by
+    -F dw, where F is P h minus the tension of the two other walls, h the height and P follows from
+    `simulated`. In scaled particle theory a wall has the tension kT n r / (1 - eta) and a deficit
+    of n r (1 - eta) / (1 + eta) disks per length (Helfand, Frisch and Lebowitz, Journal of Chemical
     Physics 34, 1037 (1961)).
     """
     area = count * math.pi * radius**2
@@ -217,27 +180,9 @@ def adiabat(
 
 
 def published(eta: float, count: int, periodic: bool) -> float:
-    """Return Z = P / (n kT) of fluid or crystal from published simulations.
+    """Return Z from simulations: of the fluid up to eta = 0.648, of the crystal from eta = 0.72.
 
-    Parameters
-    ----------
-    eta : float
-        packing fraction
-    count : int
-        number of disks
-    periodic : bool
-        whether the box is periodic
-
-    Returns
-    -------
-    float
-        Z of the fluid for packing fractions up to 0.648, Z of the crystal from 0.72, and NaN
-        between 0.648 and 0.72
-
-    Examples
-    --------
-    >>> hard_disks.published(0.7, 1000, True)
-    nan
+    In between, Z is NaN. It is that of `count` disks if the box is `periodic`.
     """
     if eta <= 0.5:
         return float(simulated_finite(eta, count) if periodic else simulated(eta))
@@ -247,43 +192,23 @@ def published(eta: float, count: int, periodic: bool) -> float:
 
 
 def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
-    """Return Z of a fluid of disks with different radii r from Z of equal disks.
+    """Return Z of a fluid of disks with different radii r, from Z of equal disks and <r>^2 / <r^2>.
 
-    The argument `alike` is <r>^2 / <r^2>.  The formula is from Santos, Yuste and Lopez de Haro,
-    Molecular Physics 96, 1 (1999).  The returned Z has the exact second virial coefficient.  If `z`
-    is Z of equal disks in scaled particle theory, the returned value is Z of the mixture in scaled
-    particle theory.
+    With the exact second virial coefficient; if `z` is that of scaled particle theory, so is the
+    result (Santos, Yuste and Lopez de Haro, Molecular Physics 96, 1 (1999)).
     """
     return (1 - alike) / (1 - eta) + alike * z
 
 
 def contact_value(z: Number, eta: Number) -> Number:
-    """Return the pair correlation function at contact, chi = (Z - 1) / (2 eta).
-
-    Parameters
-    ----------
-    z : float or numpy.ndarray
-        P / (n kT)
-    eta : float or numpy.ndarray
-        packing fraction
-
-    Returns
-    -------
-    float or numpy.ndarray
-        pair correlation function at contact, chi
-
-    Examples
-    --------
-    >>> hard_disks.contact_value(2.0, 0.25)
-    2.0
-    """
+    """Return the pair correlation function at contact, chi = (Z - 1) / (2 eta)."""
     return (z - 1) / (2 * eta)
 
 
 def collision_rate(
     z: float, diameter: float, free: float, kt: float = 1.0, mass: float = 1.0
 ) -> float:
-    """Return the collision rate per disk, computed from the pressure.
+    """Return the collision rate per disk that follows from the pressure.
 
     Parameters
     ----------
@@ -292,15 +217,14 @@ def collision_rate(
     diameter : float
         diameter of the disks [length]
     free : float
-        effective number of disks that share the energy, which is N between walls and N - 1 in a
-        periodic box
+        number of disks that share the energy: N between walls, N - 1 in a periodic box
     kt, mass : float
         temperature and mass of a disk
 
     Returns
     -------
     float
-        collision rate of a disk [1/time]
+        collision rate [1/time]
 
     Examples
     --------
@@ -316,8 +240,8 @@ def collision_rate(
 def haff_rate(xi: float) -> float:
     """Return the cooling rate -d ln K / d tau of a homogeneous gas.
 
-    K is the kinetic energy and tau the number of collisions per disk.  The second Sonine
-    coefficient a2 is from van Noije and Ernst, Granular Matter 1, 57 (1998).
+    K is the kinetic energy and tau the number of collisions per disk. The second Sonine coefficient
+    is that of van Noije and Ernst, Granular Matter 1, 57 (1998).
 
     Parameters
     ----------
@@ -339,44 +263,24 @@ def haff_rate(xi: float) -> float:
 
 
 def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
-    """Return the energy of a homogeneous cooling gas as a function of collisions per disk.
-
-    Parameters
-    ----------
-    tau : array_like
-        (T,) collisions per disk
-    xi : float
-        restitution
-
-    Returns
-    -------
-    numpy.ndarray
-        (T,) kinetic energy divided by its initial value
-
-    Examples
-    --------
-    >>> float(hard_disks.haff_by_collisions(0.0, 0.9))
-    1.0
-    """
+    """Return K / K0 (T,) of a homogeneous cooling gas at tau (T,) collisions per disk."""
     return np.exp(-haff_rate(xi) * np.asarray(tau))
 
 
 def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
-    """Return the energy of a homogeneous cooling gas as a function of time.
-
-    The formula is from Haff, Journal of Fluid Mechanics 134, 401 (1983).
+    """Return Haff's law for the energy of a homogeneous gas, J. Fluid Mech. 134, 401 (1983).
 
     Parameters
     ----------
     w0_t : array_like
-        (T,) time in units of the inverse initial collision rate
+        (T,) time in initial mean free times
     xi : float
         restitution
 
     Returns
     -------
     numpy.ndarray
-        (T,) kinetic energy divided by its initial value
+        (T,) kinetic energy over its initial value
 
     Examples
     --------
@@ -389,10 +293,9 @@ def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
 def haff_soft(law: Restitution, thermal: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return w0 t, collisions per disk and K / K0 of a cooling gas of viscoelastic disks.
 
-    w0 is the initial collision rate, t the time, K the kinetic energy and K0 its initial value.
-    The velocities are assumed to have Maxwell's distribution.  Therefore u = m g^2 / 4 kT has an
-    exponential distribution, where g is the relative normal speed of two colliding disks.  The
-    argument `thermal` is the initial sqrt(kT/m).
+    w0 is the initial collision rate, and `thermal` the initial sqrt(kT/m). For Maxwell's
+    distribution m g^2 / 4 kT is distributed exponentially, where g is the relative normal speed of
+    a collision.
     """
     k, u = np.geomspace(1, 1e-26, 1000), np.linspace(0, 40, 2001)
     g = 2 * thermal * np.sqrt(k[:, None] * u)
@@ -407,8 +310,8 @@ def noise_temperature(
 ) -> float:
     """Return the temperature at which dissipation balances white-noise driving.
 
-    The formula is from van Noije and Ernst, Granular Matter 1, 57 (1998), for velocities with
-    Maxwell's distribution and for chi from Henderson's equation of state.
+    The formula is that of van Noije and Ernst, Granular Matter 1, 57 (1998), for Maxwell's
+    distribution and chi from Henderson's equation of state.
 
     Parameters
     ----------
@@ -424,7 +327,7 @@ def noise_temperature(
     Returns
     -------
     float
-        temperature kT in the steady state
+        kT in the steady state
 
     Examples
     --------
@@ -438,26 +341,9 @@ def noise_temperature(
 
 
 def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
-    """Return the adiabatic speed of sound c of the fluid.
+    """Return the adiabatic speed of sound of the fluid [velocity] with Henderson's formula for Z.
 
-    The speed follows from c^2 = (d(eta Z)/d eta + Z^2) kT / m with Henderson's formula for Z.
-
-    Parameters
-    ----------
-    eta : float
-        packing fraction
-    kt, mass : float
-        temperature and mass of a disk
-
-    Returns
-    -------
-    float
-        speed of sound [velocity]
-
-    Examples
-    --------
-    >>> round(hard_disks.speed_of_sound(1e-5), 3)
-    1.414
+    It is the square root of (d(eta Z)/d eta + Z^2) kT / m.
     """
     step = 1e-6
     slope = ((eta + step) * henderson(eta + step) - (eta - step) * henderson(eta - step)) / step / 2
@@ -469,9 +355,8 @@ def enskog(
 ) -> dict[str, float]:
     """Return the transport coefficients of Enskog's theory.
 
-    The formulas are from Gass, Journal of Chemical Physics 54, 1898 (1971).  Only collisions
-    contribute to the bulk viscosity.  The diffusion coefficient D is in the first Sonine
-    approximation.
+    The formulas are those of Gass, Journal of Chemical Physics 54, 1898 (1971). Only collisions
+    contribute to the bulk viscosity; D is the first Sonine approximation.
 
     Parameters
     ----------
@@ -480,7 +365,7 @@ def enskog(
     eta : float
         packing fraction
     diameter, kt, mass : float
-        diameter of a disk, temperature, mass of a disk
+        diameter, temperature and mass of a disk
 
     Returns
     -------
@@ -503,76 +388,12 @@ def enskog(
     }
 
 
-def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.ndarray:
-    """Return the pair correlations at contact (S, S) of a mixture of S species.
-
-    The returned pair correlations have errors of about 1 %. The argument `z` is the compressibility
-    factor Z of a system of equal disks that has the same packing fraction as the mixture.  The
-    formula is from Jenkins and Mancini, Journal of Applied Mechanics 54, 27 (1987).  The formula
-    requires chi of equal disks; here chi follows from `z`, which is more accurate, as in Santos,
-    Yuste and Lopez de Haro, Journal of Chemical Physics 117, 5785 (2002).
-    """
-    eta = math.pi / 4 * np.sum(density * diameter**2)
-    mean = np.sum(density * diameter) / np.sum(density * diameter**2)
-    unlike = 2 * diameter[:, None] * diameter / (diameter[:, None] + diameter)
-    return 1 / (1 - eta) + (contact_value(z, eta) - 1 / (1 - eta)) * unlike * mean
-
-
-def enskog_mixture(
-    z: float, density: np.ndarray, diameter: np.ndarray, mass: np.ndarray, kt: float = 1.0
-) -> dict[str, float]:
-    """Return viscosities of a mixture of S species, and the decay time "memory" of the fluxes.
-
-    The formulas are those of Enskog's theory in the first Sonine approximation, as in Lopez de
-    Haro, Cohen and Kincaid, Journal of Chemical Physics 78, 2746 (1983), but in two dimensions.
-    The kinetic part of the shear viscosity is multiplied by 1.022, because higher approximations
-    increase the viscosity of a dilute gas of equal disks by 2.2 %.  The bulk viscosity includes the
-    effect of different temperatures of the species during an expansion.
-    """
-    total, pair = mass[:, None] + mass, (diameter[:, None] + diameter) / 2
-    reduced = mass[:, None] * mass / total
-    met = density * pair * contact_values(z, density, diameter)  # (i, j)
-    rate = met * 2 * np.sqrt(2 * math.pi * kt * reduced) / total  # 2 of it: of temperatures
-    handed = 1 + math.pi / 2 * np.sum(met * pair * mass / total, axis=1)  # with collisions
-    stress = np.diag(np.sum(rate * (2 + mass / mass[:, None]), axis=1)) - rate
-    lives = np.linalg.solve(stress, handed)
-    sums, share = 2 * rate.sum(axis=1), density / density.sum()
-    heat = np.diag(sums) - 2 * rate + sums.max() * share  # conserved mean
-    cooler = np.linalg.solve(heat, 2 * handed - 2 * share @ handed)
-    together = np.sum(density[:, None] * met * pair**2 * np.sqrt(math.pi / 2 * kt * reduced))
-    slowest = min(np.linalg.eigvals(matrix).real.min() for matrix in (stress, heat))
-    return {
-        "viscosity": float(1.022 * kt * density @ (lives * handed) + together / 2),
-        "bulk_viscosity": float(together + 2 * kt * density @ (handed * cooler)),
-        "memory": float(1 / slowest),
-    }
-
-
 def long_time_tail(
     time: np.ndarray, density: float, diffusion: float, viscosity: float
 ) -> np.ndarray:
-    """Return the long-time tail of the velocity autocorrelation from mode-coupling theory.
+    """Return the long-time tail of <v(0) v(t)> / <v^2>, (T,), from mode-coupling theory.
 
-    The formula is from Dorfman and Cohen, Physical Review Letters 25, 1257 (1970).
-
-    Parameters
-    ----------
-    time : array_like
-        (T,) lag [time]
-    density : float
-        disks per area
-    diffusion, viscosity : float
-        diffusion coefficient and kinematic viscosity [length^2/time]
-
-    Returns
-    -------
-    numpy.ndarray
-        (T,) velocity autocorrelation <v(0) v(t)> / <v^2>
-
-    Examples
-    --------
-    >>> early, late = hard_disks.long_time_tail([1.0, 2.0], 1.0, 0.5, 0.5)
-    >>> float(early / late)
-    2.0
+    `density` is in disks per area, `diffusion` coefficient and kinematic `viscosity` in
+    length^2/time (Dorfman and Cohen, Physical Review Letters 25, 1257 (1970)).
     """
     return 1 / (8 * math.pi * density * (diffusion + viscosity) * np.asarray(time))

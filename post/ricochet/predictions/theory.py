@@ -11,12 +11,9 @@ from numpy.typing import ArrayLike
 
 __all__ = [
     "demon_share",
-    "finite_n_cdf",
     "maxwell_cdf",
     "maxwell_pdf",
-    "path_density",
     "rough_ratio",
-    "rough_temperatures",
     "scattering_angle",
 ]
 
@@ -40,12 +37,12 @@ EQUIPARTITION = np.transpose(
 
 
 def maxwell_pdf(u: np.ndarray) -> np.ndarray:
-    """Return the probability density of the reduced speed u = v / sqrt(2 kT / m) in equilibrium.
+    """Return the probability density of the reduced speed in equilibrium.
 
     Parameters
     ----------
     u : numpy.ndarray
-        (n,) reduced speeds
+        (n,) reduced speeds v / sqrt(2 kT / m)
 
     Returns
     -------
@@ -66,7 +63,7 @@ def maxwell_cdf(u: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     u : numpy.ndarray
-        (n,) reduced speeds
+        (n,) reduced speeds v / sqrt(2 kT / m)
 
     Returns
     -------
@@ -82,55 +79,21 @@ def maxwell_cdf(u: np.ndarray) -> np.ndarray:
 
 
 def finite_n_cdf(count: int, periodic: bool = False) -> Law:
-    """Return the exact distribution function of the reduced speed of disks with fixed total energy.
+    """Return the exact distribution function of u = v / sqrt(2 kT / m) at fixed total energy N kT.
 
-    Let K be the kinetic energy of a disk, E the total energy, and N the number of disks.  In a box
-    with walls, K / E has the distribution Beta(1, N - 1) for any masses.  In a periodic box of
-    equal disks with total momentum 0, K N / (E (N - 1)) has the distribution Beta(1, N - 2).
-
-    Parameters
-    ----------
-    count : int
-        number of disks
-    periodic : bool
-        whether the box is periodic, so that the total momentum is conserved
-
-    Returns
-    -------
-    callable
-        distribution function of u = v / sqrt(2 kT / m) with kT = E / N
-
-    Examples
-    --------
-    >>> cdf = theory.finite_n_cdf(2)
-    >>> float(cdf(0.0)), float(cdf(np.sqrt(2.0)))
-    (0.0, 1.0)
+    The share K / E of a disk has the distribution Beta(1, N - 1) in a box with walls, for any
+    masses. In a periodic box of equal disks without total momentum, that of K N / (E (N - 1)) is
+    Beta(1, N - 2). N is `count`.
     """
     free, scale = (count - 2, count - 1) if periodic else (count - 1, count)
     return lambda u: 1 - np.clip(1 - np.square(u) / scale, 0, 1) ** free
 
 
 def path_density(x: np.ndarray) -> np.ndarray:
-    """Return the probability density of the lengths of free paths under molecular chaos.
+    """Return the probability density (n,) of free paths x (n,), in units of the mean <v> / w.
 
-    The collision rate nu(v) of a disk with the speed v is proportional to the mean relative speed
-    between this disk and a gas with Maxwell's distribution of velocities.
-
-    Parameters
-    ----------
-    x : numpy.ndarray
-        (n,) free paths in units of the mean free path <v> / w
-
-    Returns
-    -------
-    numpy.ndarray
-        (n,) density
-
-    Examples
-    --------
-    >>> x = np.linspace(0, 20, 2001)
-    >>> bool(abs(np.trapezoid(theory.path_density(x), x) - 1) < 1e-3)
-    True
+    Under molecular chaos, the collision rate nu(v) of a disk is proportional to its mean relative
+    speed in a gas with Maxwell's distribution.
     """
     u = np.linspace(0, 5, 2001)[1:]  # v / sqrt(2 kT / m)
     half = u**2 / 2
@@ -152,7 +115,7 @@ def scattering_angle(
     b : array_like
         (...) impact parameter divided by r1 + r2
     mass_ratio : float
-        mass of the disk at rest divided by the mass of the moving disk
+        mass of the disk at rest divided by that of the moving disk
     restitution : float
         normal restitution
 
@@ -180,13 +143,11 @@ ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055, (0.85, 0.3): 0.708}
 
 
 def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, float]:
-    """Return the coefficients A, B and C of the equations for the temperatures of rough disks.
+    """Return A, B and C of dT/ds = -2 (A T - B R) and dR/ds = 4 (B T - C R) for rough disks.
 
-    The translational temperature T = m <v^2> / 2 and the rotational temperature R = I <omega^2>
-    satisfy dT/ds = -2 (A T - B R) and dR/ds = 4 (B T - C R), where s is the number of collisions
-    per disk.  The velocities are assumed to have Maxwell's distribution.  The equations are from
-    Luding, Huthmann, McNamara and Zippelius, Physical Review E 57, 3416 (1998).  The argument
-    `inertia` is the moment of inertia I divided by m r^2.
+    T = m <v^2> / 2 and R = I <omega^2> are the temperatures, s the collisions per disk, and
+    `inertia` is I / m r^2. For Maxwell's distribution, from Luding, Huthmann, McNamara and
+    Zippelius, Physical Review E 57, 3416 (1998).
     """
     eta = inertia * (1 + beta) / (2 * inertia + 2)
     a = (1 - xi**2) / 4 + eta * (1 - eta) / 2
@@ -196,8 +157,8 @@ def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, f
 def rough_ratio(xi: float, beta: float, inertia: float) -> float:
     """Return the limit of the ratio R / T of the two temperatures of cooling rough disks.
 
-    The equations for the temperatures are from Luding, Huthmann, McNamara and Zippelius, Physical
-    Review E 57, 3416 (1998), for velocities with Maxwell's distribution.
+    The theory is that of Luding, Huthmann, McNamara and Zippelius, Physical Review E 57, 3416
+    (1998), for Maxwell's distribution.
 
     Parameters
     ----------
@@ -223,31 +184,10 @@ def rough_ratio(xi: float, beta: float, inertia: float) -> float:
 def rough_temperatures(
     tau: np.ndarray, start: tuple[float, float], xi: float, beta: float, inertia: float
 ) -> np.ndarray:
-    """Return both temperatures of cooling rough disks as functions of collisions per disk.
+    """Return both temperatures (2, T) of cooling rough disks at tau (T,) collisions per disk.
 
-    The equations for the temperatures are those of `rough_ratio`.
-
-    Parameters
-    ----------
-    tau : array_like
-        (T,) collisions per disk
-    start : tuple of float
-        initial translational and rotational temperature
-    xi, beta : float
-        normal and tangential restitution
-    inertia : float
-        moment of inertia divided by m r^2
-
-    Returns
-    -------
-    numpy.ndarray
-        (2, T) translational and rotational temperature
-
-    Examples
-    --------
-    >>> t, rotational = theory.rough_temperatures([0.0, 50.0], (1.0, 0.0), 0.9, 0.5, 0.5)
-    >>> round(float(t[0]), 6), bool(t[1] < 1), bool(rotational[1] > 0)
-    (1.0, True, True)
+    `start` contains the initial translational and rotational temperature; theory as of
+    `rough_ratio`.
     """
     a, b, c = rough_rates(xi, beta, inertia)
     values, vectors = np.linalg.eig(np.array([[-2 * a, 2 * b], [4 * b, -4 * c]]))
@@ -260,12 +200,10 @@ def pushed_width(
 ) -> tuple[float, float]:
     """Return mean and variance of the width of a box with a piston under a constant force.
 
-    If the piston exerts the force F, the probability density of the width w is proportional to Q(w)
-    (H - F w)^(f/2 - 1), as derived in docs/explanation/theory.md.  Q is the configuration integral
-    of the disks, H the enthalpy, and f the number of degrees of freedom including that of the
-    piston.  The density is evaluated at equally spaced `widths` (W,), for which `places` contains
-    ln Q and `energy` contains H - F w.  Where Q is unknown, `places` contains NaN and the density
-    is set to 0.  The argument `squares` is the number f of degrees of freedom.
+    The probability density of the width w is proportional to Q(w) (H - F w)^(f/2 - 1), as derived
+    in docs/explanation/theory.md, with the number of degrees of freedom f, `squares`. At equally
+    spaced `widths` (W,), `places` is ln Q of the configuration integral, NaN where it is unknown,
+    and `energy` is H - F w.
     """
     log = np.where(np.isnan(places), -np.inf, places) + (squares / 2 - 1) * np.log(energy)
     density = np.exp(log - log.max())
@@ -276,29 +214,24 @@ def pushed_width(
 def demon_share(climb: float, layers: float, xi: float) -> float:
     """Return the fraction of a dilute gas in the fuller of two chambers above a vibrating floor.
 
-    A floor that moves as a sawtooth with the velocity V supplies the power n m g V to the n disks
-    in a chamber.  If the temperature T in the chamber is uniform, collisions dissipate the power
-    n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w, where s is the diameter of a disk and w the width
-    of a chamber.  In a steady state the supplied power equals the dissipated power, so that T/m =
-    (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.  The flux out of a chamber through a hole at the height h
-    is proportional to n^2 exp(-m g h / T) (Eggers, Physical Review Letters 83, 5322 (1999)).  In a
-    steady state equal fluxes of disks pass through the hole in both directions.  The state with
-    equal numbers of disks in both chambers is unstable if m g h > T.
+    The fluxes through a hole at the height h, n^2 exp(-m g h / T), are equal (Eggers, Physical
+    Review Letters 83, 5322 (1999)). T balances the power n m g V of a sawtooth motion with the
+    velocity V and the dissipation n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w of n disks of
+    diameter s in a chamber of width w: T/m = (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.
 
     Parameters
     ----------
     climb : float
-        g h / V^2, where h is the height of the hole and V the velocity of the floor
+        g h / V^2
     layers : float
-        N s / w, where N is the number of disks in both chambers, s their diameter and w the width
-        of a chamber
+        N s / w, with N disks in both chambers
     xi : float
         restitution, below 1
 
     Returns
     -------
     float
-        fraction in the fuller chamber, which is 1/2 if the state with equal fractions is stable
+        fraction in the fuller chamber; 1/2 where the equal state is stable, m g h < T
 
     Examples
     --------

@@ -14,37 +14,13 @@ ROUNDS = 100  # of the iteration for the densities far from the walls
 def virial_pressure(
     count: np.ndarray, radius: np.ndarray, edges: np.ndarray, walls: np.ndarray
 ) -> float:
-    """Return the observable `virial_pressure` / kT of a fluid in equilibrium in a rectangular box.
+    """Return the observable `virial_pressure` / kT [1/length^2] of a fluid in a rectangular box.
 
-    The observable is (F_x L_x + F_y L_y) / (2 A), where A is the area of the box.  For each axis, F
-    is the force on a side perpendicular to the axis, and L is the mean distance between the centres
-    of two disks that touch opposite sides.  The tension of a wall and the deficit of disks at a
-    wall are from Helfand, Frisch and Lebowitz, Journal of Chemical Physics 34, 1037 (1961),
-    extended to mixtures.  The pressure far from the walls follows from Henderson's formula and, for
-    mixtures, from `of_sizes`.
-
-    Parameters
-    ----------
-    count : array_like
-        (S,) number of disks of each species
-    radius : array_like
-        (S,) radius of the disks of each species [length]
-    edges : array_like
-        (2,) width and height of the box [length]
-    walls : array_like of bool
-        (2,) whether the sides perpendicular to x, and those perpendicular to y, are walls; sides
-        that are not walls are periodic
-
-    Returns
-    -------
-    float
-        P / kT [1/length^2], or NaN if the box is too small for a fluid of these disks
-
-    Examples
-    --------
-    >>> periodic = walls.virial_pressure([1000], [0.01], [1, 1], [False, False])
-    >>> bool(np.isclose(periodic, 1000 * hard_disks.henderson(1000 * np.pi * 0.01**2)))
-    True
+    It is (F_x L_x + F_y L_y) / (2 A kT): force on a side times mean distance of centres at opposite
+    sides, for disks of S species, with numbers and radii (S,), in a box with `edges` (2,), of which
+    `walls` (2,) are not periodic. Wall tension and deficit are those of Helfand, Frisch and
+    Lebowitz, Journal of Chemical Physics 34, 1037 (1961), extended to mixtures; the bulk pressure
+    is Henderson's, and `of_sizes` for mixtures. NaN if the box is too small for a fluid.
     """
     count, radius, edges, walls = (
         np.asarray(x, dtype=float) for x in (count, radius, edges, walls)
@@ -70,9 +46,8 @@ def virial_pressure(
 def deficit(density: np.ndarray, radius: np.ndarray) -> np.ndarray:
     """Return the deficit of disks of each species (S,) at a wall, per length of the wall.
 
-    By Gibbs' adsorption equation the deficit is the derivative of the tension with respect to the
-    chemical potentials.  The tension and the chemical potentials follow from the free energy of
-    scaled particle theory.
+    By Gibbs' adsorption equation it is the derivative of the tension with respect to the chemical
+    potentials, both from the free energy of scaled particle theory.
     """
     own = math.pi * radius**2
     free, total, sizes = 1 - density @ own, density.sum(), density @ radius

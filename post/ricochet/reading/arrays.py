@@ -40,9 +40,8 @@ def in_place(function: np.ufunc, name: str) -> Any:
 class Snapshot(np.ndarray):
     """Read-only copy of an array of a simulation, such as the velocities at one time.
 
-    The in-place operators of a `Snapshot` return a new array.  Therefore the statement
-    `box.velocity *= 2` has the same effect as `box.velocity = box.velocity * 2`, which changes the
-    velocities of the simulation.  Expressions that contain a `Snapshot` return ordinary arrays.
+    In-place operators return a new array, so that `box.velocity *= 2` sets the velocities of the
+    simulation as `box.velocity = box.velocity * 2` does. Other expressions return ordinary arrays.
     """
 
     __iadd__ = in_place(np.add, "__iadd__")
@@ -59,7 +58,7 @@ class Snapshot(np.ndarray):
         return array[()] if return_scalar else np.asarray(array)
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        """Raise an error, because assignment to a read-only copy does not change the simulation."""
+        """Raise an error, because assigning to a read-only copy would not change the simulation."""
         if not self.flags.writeable:
             raise ValueError(
                 "read-only: this array is a copy of the simulation's; change a copy of it, and "

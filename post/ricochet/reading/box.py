@@ -1,19 +1,20 @@
 """Properties of the box of a run: sides, which may move, accessible area, obstacles, walls."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from .frames import Series
-from .records import Obstacle
+from .records import Change, Obstacle, changes_in
 from .results import SIDES, Results
 
 DRIFTING = (
     "constant_velocity",
     "piston",
 )  # motions of a side that change the area of the box permanently
+MOVED = ("motion", "velocity", "start_time", "end_time", "amplitude", "period", "phase")
 
 
 class BoxResults(Results):
@@ -25,15 +26,20 @@ class BoxResults(Results):
         return self.lower + self.edges
 
     @property
+    def changes(self) -> list[Change]:
+        """Time, name of the variable, and new value of each change during the run."""
+        return changes_in(self.parameters.get("changes", ""))
+
+    @property
     def sides(self) -> list[dict[str, Any]]:
-        """Input variables of each side of the box, in the order of `SIDES`."""
+        """Input variables of each side of the box at the start, in the order of `SIDES`."""
         return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
 
     def corners_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners of the box at the given times.
+        """Return the corners of the box, whose sides may move, at the given times.
 
-        If sides of the box move, the corners depend on time.  The position of a piston is
-        interpolated between the samples of the observables.
+        The positions of pistons, and of sides whose motion changes, are interpolated between
+        samples.
 
         Parameters
         ----------
@@ -59,6 +65,33 @@ class BoxResults(Results):
             inwards[..., k] = (-1) ** k * (at - end)
         return self.lower + inwards[..., ::2], self.upper - inwards[..., 1::2]
 
+    def open_at(self, time: float | np.ndarray) -> np.ndarray:
+        """Return which sides of the box are open at the given times.
+
+        Parameters
+        ----------
+        time : float or numpy.ndarray
+            (...) times
+
+        Returns
+        -------
+        numpy.ndarray
+            (..., 4) True for each side that is open, in the order left, right, bottom, top
+
+        Examples
+        --------
+        >>> run.open_at(0.5).tolist()
+        [False, False, False, False]
+        """
+        now = np.asarray(time)
+        found = np.tile([bool(side.get("open", False)) for side in self.sides], (*now.shape, 1))
+        for k, side in enumerate(SIDES):
+            for change in self.changes:
+                if change.name == f"side.{side}.open":
+                    opens = change.value.strip(" .").lower().startswith("t")
+                    found[..., k] = np.where(now >= change.time, opens, found[..., k])
+        return found
+
     @property
     def _offsets(self) -> np.ndarray:
         """Inward distance of each side (4,) from the corresponding edge of the box at the start."""
@@ -68,13 +101,20 @@ class BoxResults(Results):
 
     @cached_property
     def piston_positions(self) -> dict[int, Series]:
-        """Time series of the position of each piston; the keys are indices of `sides`."""
-        free = [k for k, side in enumerate(self.sides) if side.get("motion") == "piston"]
+        """Time series of the position of each piston or changed side, by its index in `sides`."""
+        names = (change.name.split(".") for change in self.changes)
+        new = {name[1] for name in names if name[0] == "side" and name[-1] in MOVED}
+        free = [
+            k
+            for k, side in enumerate(self.sides)
+            if side.get("motion") == "piston"
+            or (SIDES[k] in new and f"sides/{SIDES[k]}/position" in self.observables)
+        ]
         return {k: self.observable(f"sides/{SIDES[k]}/position") for k in free}
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower left and upper right corner of the area that the box covers during the run."""
+        """Lower left and upper right corner of the area covered by the box during the run."""
         swings = np.array([outmost(side) for side in self.sides])
         swings = np.maximum(0.0, swings - self._offsets)
         for k, place in self.piston_positions.items():
@@ -83,18 +123,15 @@ class BoxResults(Results):
         return self.lower - swings[::2], self.upper + swings[1::2]
 
     def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
-        """Return the area of the box minus the area of its obstacles at the given times.
+        """Return the area of the box minus that of its obstacles, or the area of a round container.
 
-        Walls and arcs have no area, and the area of a region that they enclose is not calculated.
-        If the disks are in a round container, the accessible area is the area of the container.
-        For pistons and for sides that move at constant velocity, the area depends on their
-        positions at the given times.  For oscillating sides, the area is calculated from their mean
-        positions, as in the pressure that the program writes.
+        Walls and arcs have no area, also if they enclose a region. Oscillating sides are at their
+        mean positions, as in the pressure written by the program.
 
         Parameters
         ----------
         time : float or numpy.ndarray
-            (...) times
+            (...) times, which matter for pistons and sides of constant velocity
 
         Returns
         -------
@@ -107,6 +144,7 @@ class BoxResults(Results):
         1.0
         """
         drifts = np.array([side.get("motion") in DRIFTING for side in self.sides])
+        drifts[[*self.piston_positions]] = True
         lower, upper = self.corners_at(time)
         lower = np.where(drifts[::2], lower, self.lower)
         upper = np.where(drifts[1::2], upper, self.upper)
@@ -118,11 +156,19 @@ class BoxResults(Results):
         return area
 
 
+def passages(observables: Iterable[str]) -> dict[str, list[str]]:
+    """Return the names of the observables that count disks which left or entered an open system."""
+    names = list(observables)
+    return {
+        "left": [name for name in names if name.startswith("sides/") and name.endswith("/left")],
+        "entered": [name for name in names if name.startswith("sources/")],
+    }
+
+
 def outmost(side: Mapping[str, Any]) -> float:
     """Return the largest outward displacement of a side during the run [length].
 
-    The displacement is measured from the mean position of an oscillating side, or from the initial
-    position of a side that moves at constant velocity.
+    It is measured as in `displaced`.
     """
     if side.get("motion") == "constant_velocity":
         return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
@@ -130,11 +176,10 @@ def outmost(side: Mapping[str, Any]) -> float:
 
 
 def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
-    """Return the inward displacement of a moving side at the given times.
+    """Return the inward displacement of a moving side at times (docs/explanation/theory.md).
 
-    The displacement is measured from the mean position of an oscillating side, or from the initial
-    position of a side that moves at constant velocity.  The formulae for the motion of sides are in
-    docs/explanation/theory.md.
+    It is measured from the mean position of an oscillating side, or from the initial position of a
+    side that moves at constant velocity.
     """
     if side.get("motion") == "constant_velocity":
         start, end = side["start_time"], side["end_time"]
@@ -148,7 +193,7 @@ def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
 
 
 def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
-    """Return all circular obstacles and arcs, in the order of their numbers in the event log."""
+    """Return all circular obstacles and arcs, in the order of the event log."""
     groups = parameters.get("obstacle", {})
     if "inside" not in groups:
         return ()

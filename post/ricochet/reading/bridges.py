@@ -1,4 +1,4 @@
-"""Exchange of disks with other programs, by MDAnalysis, GSD files and LAMMPS dump files.
+"""Exchange of disks with other programs: MDAnalysis, GSD files and LAMMPS dump files.
 
 The methods `Run.to_dataframe` and `Run.to_xarray` convert runs for pandas and xarray.
 """
@@ -27,27 +27,24 @@ __all__ = [
     "write_lammps",
 ]
 
-TOLERANCE = 1e-6  # largest |z| of a system in two dimensions, relative to the largest edge
+TOLERANCE = 1e-6  # largest |z| of a two-dimensional system, relative to the largest edge
 CLOSED = "ff"  # word of a LAMMPS dump for an axis with walls
 #: Columns of a LAMMPS dump that have other names in Ricochet.
 NAMES = {"angular_velocity": "omegaz"}
-#: Items of a LAMMPS dump file in whose first lines further words follow the name of the item.
+#: Items of a LAMMPS dump file whose first line continues after the name of the item.
 ITEMS = ("ATOMS", "BOX BOUNDS")
 #: Columns of a LAMMPS dump that are read and that contain numbers.
 NUMBERS = {f"{axis}{end}" for axis in "xyz" for end in ("", "u", "s", "su")}
 NUMBERS |= {"vx", "vy", "radius", "diameter", "mass", "omegaz", "orientation"}
-#: For each item of a frame: the further words in its first line, and the words of its other lines.
+#: For each item of a frame: the rest of its first line, and the words of its other lines.
 Items = dict[str, tuple[list[str], list[list[str]]]]
 
 
 def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
     """Convert a run to a `Universe` of the package MDAnalysis, which must be installed.
 
-    Because MDAnalysis requires three dimensions, all disks have z = 0. Lengths and times are stored
-    without conversion of units.  MDAnalysis assumes equally spaced frames; the time between frames
-    is set to the mean interval. In the `Universe`, the type of an atom is the name of its species;
-    for example, the method `select_atoms("type projectile")` selects the disks of the species
-    "projectile".  All analysis classes of MDAnalysis can be applied to the returned `Universe`.
+    All disks have z = 0, and lengths and times keep their values. The type of an atom is the name
+    of its species. MDAnalysis assumes equally spaced frames; their interval is set to the mean.
 
     Parameters
     ----------
@@ -78,12 +75,11 @@ def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
 
 
 class ImportedFrame(NamedTuple):
-    """State of disks at one time, read from a file that another program has written.
+    """State of disks at one time, read from the file of another program.
 
-    The dictionary `disks` can be passed to `ricochet.write_start` as keyword arguments.  It
-    contains the arrays "position" and "velocity" (N, 2), and the arrays "radius", "mass",
-    "angular_velocity" and "orientation" (N,), except arrays that the file does not contain.  The
-    array "species" (N,) contains the name of the species of each disk.
+    `disks` contains the keyword arguments of `ricochet.write_start`: "position" and "velocity" (N,
+    2), "radius", "mass", "angular_velocity" and "orientation" (N,), if they are in the file, and
+    the names "species" (N,).
     """
 
     time: float
@@ -98,7 +94,7 @@ class ImportedFrame(NamedTuple):
         Returns
         -------
         dict
-            the groups "box" and "species", for `ricochet.run` and `ricochet.Simulation`
+            groups for `ricochet.run` and `ricochet.Simulation`
 
         Examples
         --------
@@ -133,11 +129,9 @@ def write_gsd(
 ) -> Path:
     """Write frames to a GSD file in the schema of HOOMD-blue; the package gsd must be installed.
 
-    A GSD file has the origin of the coordinates at the centre of the box, stores the edges of the
-    box in single precision, and contains no walls.  Therefore the time, the corners of the box and
-    the periodic axes are also written, as the logged quantities "ricochet/time", "ricochet/lower",
-    "ricochet/upper" and "ricochet/periodic".  In the file, the step of each frame is the number of
-    the frame in the run.  The programs freud, OVITO and HOOMD-blue read GSD files.
+    The file is for freud, OVITO and HOOMD-blue. The format places the origin at the centre of the
+    box, stores its edges in single precision, and has no walls. The quantities "ricochet/time",
+    "ricochet/lower", "ricochet/upper" and "ricochet/periodic" are logged in addition.
 
     Parameters
     ----------
@@ -146,9 +140,9 @@ def write_gsd(
     path : str or Path
         the file to write
     frames : int, slice or list of int, optional
-        frames of the run [all frames]
+        frames of the run, whose numbers are the steps [all]
     precision : {"double", "single"}
-        precision of all real numbers; disks that nearly touch may overlap in single precision
+        precision of real numbers; in single precision nearly touching disks may overlap
 
     Returns
     -------
@@ -181,18 +175,19 @@ def write_gsd(
 def gsd_frame(package: Any, run: Run, frame: int) -> Any:
     """Convert a frame of a run to a frame of the package gsd."""
     lower, upper = run.corners_at(run.time[frame])
-    found, disks = package.Frame(), run[frame]
+    found, disks, inside = package.Frame(), run[frame], run.in_box(frame)
     found.configuration.step, found.configuration.dimensions = frame, 2
     found.configuration.box = [*(upper - lower), 0, 0, 0, 0]
     particles = found.particles
-    particles.N, particles.types, particles.typeid = run.n_disks, [*run.names], run.species - 1
-    particles.position = in_space(disks.position - (lower + upper) / 2)
-    particles.velocity = in_space(disks.velocity)
-    particles.mass, particles.diameter = run.mass, 2 * run.radius
+    particles.N, particles.types = len(inside), [*run.names]
+    particles.typeid = run.species[inside] - 1
+    particles.position = in_space(disks.position[inside] - (lower + upper) / 2)
+    particles.velocity = in_space(disks.velocity[inside])
+    particles.mass, particles.diameter = run.mass[inside], 2 * run.radius[inside]
     if run.image is not None:
-        particles.image = in_space(run.image[frame]).astype(np.int32)
+        particles.image = in_space(run.image[frame][inside]).astype(np.int32)
     for name in run.disk_data:
-        found.log[f"particles/{name}"] = disks.per_disk(name)
+        found.log[f"particles/{name}"] = disks.per_disk(name)[inside]
     found.log["ricochet/time"] = np.array([run.time[frame]])
     found.log["ricochet/lower"], found.log["ricochet/upper"] = lower, upper
     found.log["ricochet/periodic"] = run.periodic.astype(np.uint8)
@@ -207,18 +202,16 @@ def in_space(flat: np.ndarray) -> np.ndarray:
 def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
     """Read a frame of a GSD file; the package gsd must be installed.
 
-    If the file was not written by `write_gsd`, the axes are periodic, the origin is at the centre
-    of the box, and the time is the step of the frame.  Other programs often write positions in
-    single precision.  Rounding errors in single precision can make touching disks overlap, and
-    Ricochet refuses to start with disks that overlap.  To prevent overlaps caused by rounding
-    errors, multiply the radii by 1 - 1e-6.
+    In files not written by `write_gsd`, the axes are periodic, the origin is at the centre of the
+    box, and the time is the step of the frame. If positions were written in single precision,
+    touching disks can overlap by rounding, which Ricochet refuses: multiply the radii by 1 - 1e-6.
 
     Parameters
     ----------
     path : str or Path
         a GSD file in the schema of HOOMD-blue, in two dimensions
     frame : int
-        number of the frame, counted from 0, or from the end if it is negative
+        number of the frame, from 0, or from the end if negative
 
     Returns
     -------
@@ -240,6 +233,7 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
     True
     """
     package, path = optional_package("gsd.hoomd", "read_gsd"), Path(path)
+    where = f"{path}: frame {frame}"
     try:
         check_index(path)
         with package.open(str(path), "r") as file, np.errstate(all="ignore"):
@@ -247,11 +241,11 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
             if not -count <= frame < count:
                 raise RunError(f"{path}: has no frame {frame}; it has {count} frames")
             check_counts(file.file, path, frame % count)
-            return imported_gsd(path, file[frame])
+            return imported_gsd(where, file[frame])
     except FileNotFoundError:
         raise RunError(f"{path}: no such file") from None
     except DAMAGE as problem:
-        raise RunError(f"{path}: frame {frame} cannot be read ({in_words(problem)})") from None
+        raise RunError(f"{where} cannot be read ({in_words(problem)})") from None
 
 
 def in_words(problem: BaseException) -> str:
@@ -259,14 +253,14 @@ def in_words(problem: BaseException) -> str:
     return " ".join(str(problem).split()) or type(problem).__name__
 
 
-def imported_gsd(path: Path, found: Any) -> ImportedFrame:
-    """Return the disks of a frame of the package gsd."""
+def imported_gsd(where: str, found: Any) -> ImportedFrame:
+    """Return the disks of a frame of the package gsd; `where` names the file and the frame."""
     box, particles, log = found.configuration.box, found.particles, found.log
     width, height, *_, xy, xz, yz = box.tolist()
     if any((xy, xz, yz)):
-        raise RunError(f"{path}: its box is tilted; only rectangular boxes can be read")
+        raise RunError(f"{where}: its box is tilted; only rectangular boxes can be read")
     edges = np.array([width, height])
-    in_plane(path, particles.position[:, 2], edges)
+    in_plane(where, particles.position[:, 2], edges)
     lower = np.asarray(log.get("ricochet/lower", -edges / 2), dtype=float)
     upper = np.asarray(log.get("ricochet/upper", edges / 2), dtype=float)
     periodic = np.asarray(log.get("ricochet/periodic", (1, 1))).astype(bool)
@@ -282,19 +276,19 @@ def imported_gsd(path: Path, found: Any) -> ImportedFrame:
 
 
 def gsd_diameters(particles: Any) -> np.ndarray:
-    """Return the diameters (N,) of the disks, which a file may contain for each particle type."""
+    """Return the diameters (N,) of the disks, which a file may list per particle type."""
     shapes = [(one or {}).get("diameter") for one in particles.type_shapes or []]
     if len(shapes) == len(particles.types) and all(shapes):
         return np.array(shapes, dtype=float)[particles.typeid]
     return np.asarray(particles.diameter, dtype=float)
 
 
-def in_plane(path: Path, z: np.ndarray, edges: np.ndarray) -> None:
+def in_plane(where: str, z: np.ndarray, edges: np.ndarray) -> None:
     """Raise RunError unless all disks have the same z."""
     if not np.all(np.isfinite(z)):
         raise ValueError("z: not all numbers are finite")
     if len(z) and np.ptp(z) > TOLERANCE * np.max(edges):
-        raise RunError(f"{path}: is three-dimensional: its particles have different z")
+        raise RunError(f"{where} is three-dimensional: its particles have different z")
 
 
 def checked(
@@ -331,9 +325,8 @@ def write_lammps(
     """Write frames to a text file in the format of the command `dump custom` of LAMMPS.
 
     The columns are id, type, element (the name of the species), x, y, z, vx, vy, vz, radius, mass,
-    for a periodic box also ix, iy, iz, and for disks that can rotate omegaz and orientation.
-    Numbers are written with full precision.  In the file, the time step of each frame is the number
-    of the frame in the run.
+    for a periodic box also ix, iy, iz, and for disks that can rotate omegaz and orientation, with
+    full precision. The time step of a frame is its number in the run.
 
     Parameters
     ----------
@@ -342,10 +335,9 @@ def write_lammps(
     path : str or Path
         the file to write
     frames : int, slice or list of int, optional
-        frames of the run [all frames]
+        frames of the run [all]
     time : bool
-        whether the time of each frame is written as the item TIME, as LAMMPS does with
-        `dump_modify time yes`; MDAnalysis cannot read files with this item
+        whether to write the item TIME, as `dump_modify time yes` does; MDAnalysis cannot read it
 
     Returns
     -------
@@ -375,21 +367,22 @@ def lammps_frame(run: Run, frame: int, time: bool) -> str:
     """Convert a frame of a run to the lines of a LAMMPS dump file."""
     lower, upper = run.corners_at(run.time[frame])
     sides = np.array([[*lower, -0.5], [*upper, 0.5]]).T.tolist()
-    disks, zero = run[frame], [0] * run.n_disks
-    names = [run.names[s - 1].replace(" ", "_") for s in run.species]
-    columns: dict[str, list[Any]] = {"id": [*range(1, run.n_disks + 1)]}
-    columns |= {"type": run.species.tolist(), "element": names}
+    disks, inside = run[frame], run.in_box(frame)
+    zero, species = [0] * len(inside), run.species[inside]
+    names = [run.names[s - 1].replace(" ", "_") for s in species]
+    columns: dict[str, list[Any]] = {"id": (inside + 1).tolist()}
+    columns |= {"type": species.tolist(), "element": names}
     for head, vectors in (("", disks.position), ("v", disks.velocity)):
-        x, y = vectors.T.tolist()
+        x, y = vectors[inside].T.tolist()
         columns |= {f"{head}x": x, f"{head}y": y, f"{head}z": zero}
-    columns |= {"radius": run.radius.tolist(), "mass": run.mass.tolist()}
+    columns |= {"radius": run.radius[inside].tolist(), "mass": run.mass[inside].tolist()}
     for name in run.disk_data:
-        columns[NAMES.get(name, name)] = disks.per_disk(name).tolist()
+        columns[NAMES.get(name, name)] = disks.per_disk(name)[inside].tolist()
     if run.image is not None:
-        x, y = run.image[frame].T.tolist()
+        x, y = run.image[frame][inside].T.tolist()
         columns |= {"ix": x, "iy": y, "iz": zero}
     lines = ["ITEM: TIME", str(float(run.time[frame]))] if time else []
-    lines += ["ITEM: TIMESTEP", str(frame), "ITEM: NUMBER OF ATOMS", str(run.n_disks)]
+    lines += ["ITEM: TIMESTEP", str(frame), "ITEM: NUMBER OF ATOMS", str(len(inside))]
     kinds = ["pp" if axis else CLOSED for axis in run.periodic]
     lines += [" ".join(["ITEM: BOX BOUNDS", *kinds, "pp"]), *(f"{a} {b}" for a, b in sides)]
     lines.append(" ".join(["ITEM: ATOMS", *columns]))
@@ -400,18 +393,16 @@ def lammps_frame(run: Run, frame: int, time: bool) -> str:
 def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
     """Read a frame of a text file of the command `dump` of LAMMPS.
 
-    The file must contain the positions as x and y, xu and yu (unwrapped), or xs and ys (scaled).
-    The columns id, element or type, vx, vy, radius or diameter, mass, omegaz and orientation are
-    read if they exist.  The name of a species is the element of its particles or, without a column
-    `element`, their type.  If a frame does not contain the item TIME, its time step is used as the
-    time.
+    Positions must be x and y, xu and yu (unwrapped), or xs and ys (scaled). The columns id, element
+    or type (which name the species), vx, vy, radius or diameter, mass, omegaz and orientation are
+    optional. The time is that of the item TIME or, without it, the time step.
 
     Parameters
     ----------
     path : str or Path
         the dump file
     frame : int
-        number of the frame, counted from 0, or from the end if it is negative
+        number of the frame, from 0, or from the end if negative
 
     Returns
     -------
@@ -421,7 +412,7 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
     Raises
     ------
     RunError
-        if the file is not such a file or is damaged, or its particles are not in a rectangle
+        if the file is no such file or is damaged, or its particles are not in a rectangle
 
     Examples
     --------
@@ -433,6 +424,7 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
     'bed.txt'
     """
     path = Path(path)
+    where = f"{path}: frame {frame}"
     try:
         with path.open("rb") as file, np.errstate(all="ignore"):
             starts = [*frame_starts(file)]
@@ -440,21 +432,21 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
                 count = f"it has {len(starts)} frames" if starts else "it is no dump file of LAMMPS"
                 raise RunError(f"{path}: has no frame {frame}; {count}")
             file.seek(starts[frame])
-            return imported(path, items_of(file))
+            return imported(where, items_of(file))
     except FileNotFoundError:
         raise RunError(f"{path}: no such file") from None
     except OSError as problem:
         raise RunError(f"{path}: {problem.strerror}") from None
     except KeyError as problem:
-        raise RunError(f"{path}: frame {frame} has no ITEM: {problem.args[0]}") from None
+        raise RunError(f"{where} has no ITEM: {problem.args[0]}") from None
     except DAMAGE as problem:
-        raise RunError(f"{path}: frame {frame} is damaged ({in_words(problem)})") from None
+        raise RunError(f"{where} is damaged ({in_words(problem)})") from None
 
 
 def frame_starts(file: BinaryIO) -> Iterator[int]:
-    """Yield the position in a dump file, in bytes, at which each frame starts.
+    """Yield the positions in a dump file, in bytes, at which frames start.
 
-    A frame starts with its time step, or with the units and the time that precede the time step.
+    A frame starts with its time step, or with the units and the time that precede it.
     """
     place, before = 0, False
     while line := file.readline():
@@ -480,24 +472,24 @@ def items_of(file: BinaryIO) -> Items:
     return items
 
 
-def imported(path: Path, items: Items) -> ImportedFrame:
-    """Return the disks of a frame of a dump file."""
+def imported(where: str, items: Items) -> ImportedFrame:
+    """Return the disks of a frame of a dump file; `where` names the file and the frame."""
     kinds, bounds = items["BOX BOUNDS"]
     if len(kinds) != 3:
-        raise RunError(f"{path}: its box is tilted; only rectangular boxes can be read")
+        raise RunError(f"{where}: its box is tilted; only rectangular boxes can be read")
     lower, upper = np.array(bounds[:2], dtype=float).T
     periodic = np.array([kind == "pp" for kind in kinds[:2]])
     columns, rows = items["ATOMS"]
     count = int(items["NUMBER OF ATOMS"][1][0][0])
     if len(rows) != count or any(len(row) != len(columns) for row in rows):
         whole = f"{count} lines of {len(columns)} columns"
-        raise RunError(f"{path}: is cut short: a frame does not consist of {whole}")
+        raise RunError(f"{where} is cut short: it does not consist of {whole}")
     if "id" in columns:
         rows.sort(key=lambda row: int(row[columns.index("id")]))
     text = dict(zip(columns, np.array(rows).reshape(-1, len(columns)).T, strict=True))
     numbers = {name: text[name].astype(float) for name in NUMBERS & text.keys()}
     in_plane(
-        path,
+        where,
         next((numbers[z] for z in ("z", "zu", "zs") if z in numbers), lower[:0]),
         upper - lower,
     )
@@ -509,7 +501,7 @@ def imported(path: Path, items: Items) -> ImportedFrame:
     places = [vectors[way] for way in ("{}", "{}u") if way in vectors]
     places += [lower + vectors[way] * (upper - lower) for way in ("{}s", "{}su") if way in vectors]
     if not places:
-        raise RunError(f"{path}: has no columns x and y (or xu and yu, or xs and ys)")
+        raise RunError(f"{where} has no columns x and y (or xu and yu, or xs and ys)")
     disks = {"position": places[0]}
     disks |= {"velocity": vectors["v{}"]} if "v{}" in vectors else {}
     disks |= {"radius": numbers["diameter"] / 2} if "diameter" in numbers else {}

@@ -1,8 +1,7 @@
 """Contact networks and force chains from the event log of a run.
 
-In an event-driven simulation a force is the momentum that collisions transfer per time.  Disks that
-stay close to each other collide many times in a window of time, and the mean force between two
-disks is the sum of the impulses of their collisions divided by the length of the window.
+In an event-driven simulation a force is the momentum transferred by collisions per unit of time:
+the mean force between two disks in a window of time is the sum of their impulses over its length.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,18 +21,17 @@ __all__ = ["ContactNetwork", "chains", "network"]
 class ContactNetwork(NamedTuple):
     """Contacts of disks with each other and with boundaries, from collisions in a window of time.
 
-    All arrays of a `ContactNetwork` have one row for each of the E contacts.  The number `j` has
-    the same meaning as in `EventLog`.  Positive values of `j` are ids of disks, which are larger
-    than `i`.  The values 0, -1, -2, ... of `j` denote boundaries.
+    All arrays have a row for each of the E contacts. As in `EventLog`, a positive `j` is the id of
+    a disk (larger than `i`), and 0, -1, -2, ... are boundary ids.
     """
 
     i: np.ndarray  # (E,) id of a disk, counted from 1
     j: np.ndarray  # (E,)
     contacts: np.ndarray  # (E,) number of collisions
-    impulse: np.ndarray  # (E,) sum of the magnitudes of the changes of momentum
-    momentum: np.ndarray  # (E, 2) sum of the changes of momentum of disk i
-    start: float  # of the window; a collision at this time is not included
-    end: float  # of the window; a collision at this time is included
+    impulse: np.ndarray  # (E,) sum of the magnitudes of the momentum changes
+    momentum: np.ndarray  # (E, 2) sum of the momentum changes of disk i
+    start: float  # of the window; a collision at exactly this time is excluded
+    end: float  # of the window; a collision at exactly this time is included
 
     @property
     def force(self) -> np.ndarray:
@@ -73,7 +71,7 @@ class ContactNetwork(NamedTuple):
         return (half + half.T).tocsr()
 
     def to_dataframe(self) -> "pandas.DataFrame":
-        """Return the contacts as a pandas DataFrame, which has one row for each contact.
+        """Return the contacts as a pandas DataFrame.
 
         Returns
         -------
@@ -110,12 +108,12 @@ def network(run: Run, start: float | None = None, end: float | None = None) -> C
     Returns
     -------
     ContactNetwork
-        one row for each pair of disks, or disk and boundary, that collided in the window
+        a row for each pair of disks, or disk and boundary, that collided in the window
 
     Raises
     ------
     RunError
-        if the run has no event log, or if the window does not lie in the run
+        if the run has no event log, or the window does not lie in the run
 
     Examples
     --------
@@ -142,25 +140,25 @@ def network(run: Run, start: float | None = None, end: float | None = None) -> C
 
 
 def chains(found: ContactNetwork, above: float = 1.0, at_least: int = 3) -> list[np.ndarray]:
-    """Return the force chains: groups of disks that are connected by strong contacts.
+    """Return the force chains: groups of disks connected by strong contacts.
 
-    A contact of two disks is strong if its impulse exceeds `above` times the mean impulse of all
-    contacts of two disks.  The strong contacts carry the deviatoric load of a granular medium
-    (Radjai and others, Physical Review Letters 80, 61, 1998).
+    A contact is strong if its impulse exceeds `above` times the mean of all contacts between disks;
+    such contacts bear the deviatoric load of a granular medium (Radjai and others, Physical Review
+    Letters 80, 61 (1998)).
 
     Parameters
     ----------
     found : ricochet.contacts.ContactNetwork
         the contacts in a window of time
     above : float
-        smallest impulse of a strong contact, divided by the mean impulse
+        smallest impulse of a strong contact over the mean impulse
     at_least : int
-        smallest number of disks of a chain
+        fewest disks of a chain
 
     Returns
     -------
     list of numpy.ndarray
-        ids of the disks of each chain, in increasing order; the largest chain comes first
+        ids of the disks of each chain, in increasing order, the largest chain first
 
     Examples
     --------

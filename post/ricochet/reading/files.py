@@ -15,21 +15,15 @@ from typing import Any
 import h5py
 import numpy as np
 
-PRIORITY = 10  # order of the removal of folders among the actions at the end of a process
+PRIORITY = 10  # order in which folders are removed among the actions at the end of a process
 
 
 class RunError(Exception):
-    """Error that is raised for a file that cannot be used.
-
-    The error message contains the path of the file and the reason.
-    """
+    """Error raised for a file that cannot be used; the message contains its path and the reason."""
 
 
 class Unsound(Exception):
-    """Error that is raised for invalid contents of a file.
-
-    The function `open_file` adds the path of the file to the error message.
-    """
+    """Error raised for invalid contents of a file; `open_file` adds its path to the message."""
 
 
 def installing(package: str) -> str:
@@ -38,7 +32,7 @@ def installing(package: str) -> str:
 
 
 def optional_package(module: str, user: str) -> Any:
-    """Import an optional module, or raise an ImportError that states how to install the module."""
+    """Import an optional module, or raise an ImportError that explains how to install it."""
     try:
         return import_module(module)
     except ImportError:
@@ -48,7 +42,7 @@ def optional_package(module: str, user: str) -> Any:
 
 @contextmanager
 def open_file(path: Path) -> Iterator[h5py.File]:
-    """Open an HDF5 file for reading, and raise RunError if its contents cannot be used."""
+    """Open an HDF5 file for reading; raise RunError if its contents cannot be used."""
     with hdf5_file(path) as file:
         try:
             yield file
@@ -61,7 +55,7 @@ def open_file(path: Path) -> Iterator[h5py.File]:
 
 
 def hdf5_file(path: Path) -> h5py.File:
-    """Open an HDF5 file for reading, also while a simulation is writing the file."""
+    """Open an HDF5 file for reading, also while a simulation is writing it."""
     if not path.exists():
         part = Path(f"{path}.part")
         hint = f", but there is {part} of an unfinished run" if part.exists() else None
@@ -84,7 +78,7 @@ def hdf5_file(path: Path) -> h5py.File:
 
 
 def did_you_mean(word: str, others: Iterable[str]) -> str:
-    """Return a question that suggests the most similar word, or an empty text."""
+    """Return a question that suggests the most similar word, or an empty string."""
     return "".join(f"; did you mean {near}?" for near in get_close_matches(word, others, 1))
 
 
@@ -106,10 +100,9 @@ def plain(value: object) -> object:
 
 
 def destination(path: Path) -> Path:
-    """Create the folder of a result, and check whether the result may be written.
+    """Create the folder of a result, and return its path.
 
-    The function returns the argument `path`.  An existing file may be replaced only if it is an
-    ordinary file that contains no HDF5 data.
+    RunError is raised if the path is an existing file that is not ordinary, or contains HDF5 data.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.is_symlink() or (path.exists() and not path.is_file()):
@@ -122,15 +115,14 @@ def destination(path: Path) -> Path:
 
 
 class TemporaryFolder:
-    """Temporary folder for the output file of a run that the user does not keep.
+    """Temporary folder for an output file, which is removed when no object refers to it any longer.
 
-    The folder is removed when no object refers to it any longer.  If a worker process returns a run
-    to its parent process, the parent process removes the folder.  If a run is sent to worker
-    processes, the sending process removes the folder when it ends.
+    If a worker process returns a run to its parent, the parent removes the folder. If a run is sent
+    to worker processes, the sending process removes it when it ends.
     """
 
     def __init__(self, path: Path | None = None):
-        """Create a folder, or become responsible for removing the folder of a worker process."""
+        """Create a folder, or become responsible for removing that of a worker process."""
         self.path = Path(tempfile.mkdtemp(prefix="ricochet-")) if path is None else path
         self.removal = Finalize(self, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
 
@@ -155,9 +147,5 @@ class TemporaryFolder:
 
 
 def received(path: Path, sent_by_worker: bool) -> TemporaryFolder | None:
-    """Return the folder of a run that a worker process has sent.
-
-    The function returns None for a run that the parent process sent to this process, because the
-    parent process will remove the folder of the run.
-    """
+    """Return the folder of a run sent by a worker process, or None if the parent sent it."""
     return TemporaryFolder(path) if sent_by_worker else None

@@ -1,4 +1,4 @@
-"""Checks of files that other programs have written, before and after their data are read."""
+"""Checks of files written by other programs, before and after their data are read."""
 
 from pathlib import Path
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 __all__ = ["DAMAGE", "check_counts", "check_index", "check_values"]
 
-#: Exceptions that occur while data of a damaged file are interpreted.
+#: Exceptions that can occur while data of a damaged file are interpreted.
 DAMAGE = (
     ArithmeticError,
     AttributeError,
@@ -19,9 +19,9 @@ DAMAGE = (
     ValueError,
 )
 MAGIC = 0x65DF65DF65DF65DF  # first number of a GSD file
-#: Header of a GSD file: places and sizes of the index and of the list of names.
+#: Header of a GSD file: positions and sizes of the index and of the list of names.
 HEADER = np.dtype([("magic", "<u8"), ("index", "<u8", 2), ("names", "<u8", 2)])
-#: Entry of the index of a GSD file: an array of N x M values at a place in the file.
+#: Entry of the index of a GSD file: an array of N x M values at a position in the file.
 ENTRY = np.dtype("<u8, <u8, <i8, <u4, <u2, u1, u1")
 ENTRY.names = "frame", "N", "place", "M", "id", "type", "flags"
 NAME_BYTES = 64  # size of an entry in the list of names
@@ -31,10 +31,10 @@ GROUPS = ("particles", "bonds", "angles", "dihedrals", "impropers", "constraints
 
 
 def check_index(path: Path) -> None:
-    """Raise ValueError if a GSD file is shorter than its header or its index says.
+    """Raise ValueError if a GSD file is shorter than its header or its index states.
 
-    The package gsd trusts counts and places that it finds in a file.  With wrong values it
-    allocates arrays that exceed the memory, or reads beyond the end of the file.
+    The package gsd trusts the counts and positions in a file, and would allocate more than the
+    memory or read beyond the end of the file.
     """
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -58,7 +58,7 @@ def check_index(path: Path) -> None:
 def check_counts(file: Any, path: Path, frame: int) -> None:
     """Raise ValueError if a frame of an open GSD file counts more members than the file has bytes.
 
-    The package gsd reads the first frame, too, and fills arrays of all members with default values.
+    The first frame, which gsd also reads, is checked too.
     """
     for name in (f"{group}/N" for group in GROUPS):
         for k in {0, frame}:
@@ -72,11 +72,8 @@ def check_counts(file: Any, path: Path, frame: int) -> None:
 def check_values(arrays: dict[str, np.ndarray]) -> None:
     """Raise ValueError unless all numbers of a frame are possible.
 
-    Parameters
-    ----------
-    arrays : dict
-        "time", the corners "lower" and "upper" of the box (2,), and for N disks "position" and
-        "velocity" (N, 2) and other quantities (N,)
+    `arrays` are "time", the corners "lower" and "upper" of the box (2,), and for N disks "position"
+    and "velocity" (N, 2) and other quantities (N,).
     """
     for name, values in arrays.items():
         if not np.all(np.isfinite(values)):

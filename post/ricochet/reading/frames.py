@@ -1,7 +1,7 @@
 """Types for quantities of the disks in all frames, and for time series of observables.
 
-The quantities and the time series can be used like arrays in expressions and in NumPy functions,
-for example `run.velocity * 2`, `run.observable("all/temperature").mean()`.
+Both can be used like arrays in expressions and in NumPy functions, as in `run.velocity * 2` or
+`run.observable("all/temperature").mean()`.
 """
 
 from collections.abc import Iterator
@@ -15,15 +15,15 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from .files import RunError, Unsound, open_file
 
 DISKS = "particles/disks"
-WHOLE = (type(None), type(...), bool, np.bool_)  # a first index of these does not select frames
+WHOLE = (type(None), type(...), bool, np.bool_)  # first indices that do not select frames
 
 
 class NoSuchFrame(RunError, IndexError):
-    """Error that is raised for the number of a frame that does not exist."""
+    """Error for the number of a frame that does not exist."""
 
 
 class Values(NDArrayOperatorsMixin):
-    """Base class that implements arithmetic with NumPy arrays as results."""
+    """Base class for arithmetic with NumPy arrays as results."""
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         """Return all values of the quantity or time series as an array."""
@@ -60,9 +60,8 @@ class Values(NDArrayOperatorsMixin):
 class Series(Values):
     """Time series of an observable: an array of times (T,) and an array of values (T, ...).
 
-    The times of an observable are in general not the times of the frames.  Indices, NumPy functions
-    and arithmetic use the values: for example, `series[-1]` is the last value.  The statement
-    `time, value = series` assigns the array of times and the array of values.
+    These are usually not the times of the frames. Indices, NumPy functions and arithmetic use the
+    values: `series[-1]` is the last value. `time, value = series` assigns both arrays.
 
     Parameters
     ----------
@@ -120,22 +119,23 @@ class Series(Values):
 
 @dataclass(frozen=True, eq=False)
 class Frames(Values):
-    """A quantity of each disk in all frames, which is read from the output file when needed.
+    """A quantity of each disk in all frames, read from the output file when needed.
 
-    An index such as `[-1]` reads only the selected frames.  The index `[:]`, expressions and NumPy
-    functions read all frames.
+    An index such as `[-1]` reads only the selected frames; `[:]`, expressions and NumPy functions
+    read all of them.
     """
 
     path: Path
     name: str
     shape: tuple[int, ...]  # (T, N), or (T, N, 2)
-    folder: object = field(default=None, repr=False)  # keeps a temporary file while this is alive
+    # keeps a temporary file as long as this object exists
+    folder: object = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return self.shape[0]
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        """Yield one frame after another; each frame is read when it is needed."""
+        """Yield one frame after another, each read when needed."""
         return (self[k] for k in range(len(self)))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
@@ -157,7 +157,7 @@ class Frames(Values):
         return self.read(np.arange(0)).dtype
 
     def __getitem__(self, index: Any) -> np.ndarray:
-        """Return the values that a NumPy index selects; only the selected frames are read."""
+        """Return the values that a NumPy index selects, reading only these frames."""
         first, *rest = index if isinstance(index, tuple) and index else (index,)
         try:
             if type(first) in WHOLE or np.ndim(first) > 1:

@@ -1,4 +1,4 @@
-"""The layout of time series in an output file, which is an HDF5 file."""
+"""Layout of the time series in an output file (HDF5)."""
 
 from collections.abc import Iterator
 
@@ -33,17 +33,13 @@ def series_of(file: h5py.File, name: str, count: int) -> Series:
 def committed(file: h5py.File, group: str) -> int:
     """Return the number of samples in a group that have been written completely.
 
-    An unfinished file contains space for further samples, and the numbers in this space are not
-    valid.
+    An unfinished file also has space for further samples, with invalid numbers.
     """
     return int(file[group]["committed"][()])
 
 
 def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
-    """Return the first `count` rows of a dataset, or all rows if `count` is None.
-
-    Floating-point numbers are converted to double precision.
-    """
+    """Return the first `count` rows of a dataset, or all, as double precision if they are real."""
     values = data[:count]
     if count is not None and len(values) < count:
         raise Unsound(f"{data.name} holds {len(values)} of {count} samples")

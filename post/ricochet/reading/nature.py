@@ -1,12 +1,12 @@
-"""Traits of a run: physical properties that determine which theories apply to the run.
+"""Traits of a run: physical properties that determine which theories apply to it.
 
     run.nature                      # Nature({'inelastic', 'walls', ...}), the differences from
                                     # equal smooth elastic disks in an empty periodic box
     run.nature.closed               # whether only collisions change the energy
     allow(run, "Haff's law", "inelastic", "mixture")   # an error for any other trait
 
-The function `nature_of` determines the traits from the parameters and the energy balance of a run.
-`nature_of` is used both for output files and for simulations in memory.
+`nature_of` determines the traits from the parameters and the energy balance of a run, both for
+output files and for simulations in memory.
 """
 
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ import numpy as np
 
 from .files import RunError
 
-ROUNDING = 1e-6  # fraction of the energy below which losses are rounding errors
-#: Every trait, and the words that describe the trait in an error message.
+ROUNDING = 1e-6  # relative energy loss below which it is a rounding error
+#: Every trait, with its description in an error message.
 TRAITS = {
     "changed": "was changed during the run",
     "collapsed": "passed an inelastic collapse, after which rounding errors determine its state",
@@ -27,6 +27,7 @@ TRAITS = {
     "random_walk": "has a centre of mass that noise moves (drive.keep_momentum)",
     "active": "has active disks (&drive)",
     "recycled": "recycles disks (drive.kind = 'recycle'), which jump",
+    "open": "is an open system, which disks leave or enter (side.open, &source, species.waiting)",
     "moving_sides": "has moving sides",
     "piston": "has a piston",
     "sliding_surfaces": "has sliding surfaces",
@@ -44,36 +45,34 @@ TRAITS = {
     "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
-#: Traits of runs whose energy also changes for reasons other than dissipation in collisions.
+#: Traits of runs whose energy changes for reasons other than dissipation in collisions.
 SOURCES = {
     "changed",
     "sheared",
     "noise_driven",
     "active",
     "recycled",
+    "open",
     "moving_sides",
     "piston",
     "sliding_surfaces",
 }
 SOURCES |= {"thermostatted", "thermal_walls"}
 THERMOSTATS = ("andersen", "brownian")  # kinds of driving with a heat bath
-#: Physical properties (traits) of runs whose velocities also change between collisions.
+#: Traits of runs whose velocities also change between collisions.
 KICKED = {"noise_driven", "active", "recycled", "thermostatted"}
-#: Physical properties (traits) of runs whose velocities do not relax to a Maxwell distribution.
+#: Traits of runs whose velocities do not relax to a Maxwell distribution.
 UNSETTLED = {*SOURCES, "unequal_temperatures", "inelastic", "soft_contacts", "round_container"} - {
     "thermostatted",
     "thermal_walls",
     "piston",
 }
-#: Physical properties (traits) that permit velocities to relax to a Maxwell distribution.
+#: Traits that permit velocities to relax to a Maxwell distribution.
 SETTLED = TRAITS.keys() - UNSETTLED
 
 
 class Refused(RunError):
-    """Error that is raised for a run to which a theory does not apply.
-
-    The error message contains the reason why the theory does not apply.
-    """
+    """Error for a run to which a theory does not apply; the message states the reason."""
 
 
 class Nature(frozenset[str]):
@@ -91,7 +90,7 @@ class Nature(frozenset[str]):
 
     @property
     def cooling(self) -> bool:
-        """True if the disks only lose energy and therefore do not reach a steady state."""
+        """True for a freely cooling gas, which never reaches a steady state."""
         return self.closed and "inelastic" in self
 
     @property
@@ -120,9 +119,8 @@ def nature_of(
 ) -> Nature:
     """Return the traits of a run, determined from its parameters and its energy balance.
 
-    The argument `lost` is the ratio of the dissipated energy to the largest kinetic energy of the
-    run. The argument `turning` is true if the disks can rotate, and `collapsed` is true if an
-    inelastic collapse occurred.
+    `lost` is the dissipated energy over the largest kinetic energy, `turning` is true if the disks
+    can rotate, and `collapsed` if an inelastic collapse occurred.
     """
     contact, drive = parameters.get("contact", {}), parameters.get("drive", {})
     box, kind = parameters.get("box", {}), drive.get("kind", "none")
@@ -130,9 +128,8 @@ def nature_of(
     motions = {one.get("motion", "still") for one in surfaces}
     beta = float(contact.get("tangential_restitution", -1.0))
     pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
-    # If collisions of two disks dissipate energy, the run has the trait "inelastic" from the start.
-    # If only walls dissipate energy, the run has the trait "inelastic" after the first loss of
-    # energy.
+    # A run is "inelastic" from the start if collisions of two disks dissipate energy, and after the
+    # first loss of energy if only walls do.
     slips = beta > -1 and (beta < 1 or contact.get("friction") is not None)
     inelastic = len(mass) > 1 and (pairs.min() < 1 or slips)
     found = {
@@ -146,6 +143,7 @@ def nature_of(
         and drifts(parameters),
         "active": kind == "active",
         "recycled": kind == "recycle",
+        "open": opens(parameters),
         "moving_sides": bool(motions - {"still", "piston"}),
         "piston": "piston" in motions,
         "sliding_surfaces": any(one.get("surface_velocity", 0.0) != 0 for one in surfaces),
@@ -177,6 +175,19 @@ def nature_of(
     return Nature(name for name, there in found.items() if there)
 
 
+def opens(parameters: Mapping[str, Any]) -> bool:
+    """Return whether disks can leave or enter the box, or could before a change."""
+    species = parameters.get("species", {})
+    waiting = any(one.get("waiting", 0) for one in species.values() if isinstance(one, Mapping))
+    lids = any(one.get("open") for one in parameters.get("side", {}).values())
+    return bool("source" in parameters or waiting or lids or ".open=" in changes_in(parameters))
+
+
+def changes_in(parameters: Mapping[str, Any]) -> str:
+    """Return the changes of a run."""
+    return str(parameters.get("changes", "")).replace(" ", "")
+
+
 def surfaces_of(parameters: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the input variables of each side, obstacle and wall."""
     return [
@@ -187,7 +198,7 @@ def surfaces_of(parameters: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def bath_temperatures(parameters: Mapping[str, Any]) -> list[float]:
-    """Return kT of each heat bath; heat baths are thermal boundaries and thermostats."""
+    """Return kT of each heat bath, that is, of thermal boundaries and thermostats."""
     drive, surfaces = parameters.get("drive", {}), surfaces_of(parameters)
     baths = [float(drive["temperature"])] if drive.get("kind") in THERMOSTATS else []
     return baths + [float(one["temperature"]) for one in surfaces if known(one.get("temperature"))]
@@ -213,21 +224,23 @@ def held_round(parameters: Mapping[str, Any]) -> bool:
 
 
 def rows_of(group: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Convert a dictionary of columns to a list of dictionaries, one for each obstacle or wall."""
+    """Convert columns, such as those of a group of obstacles, to a list of rows."""
     columns = {name: column for name, column in group.items() if np.ndim(column) > 0}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def known(value: Any) -> bool:
-    """Return whether the input specifies `value`; an unspecified value is None, NaN or 0."""
+    """Return whether the input specifies `value`, which is None, NaN or 0 if it does not."""
     return value is not None and bool(np.isfinite(value)) and float(value) > 0
 
 
-def allow(run: Any, law: str, *traits: str) -> None:
-    """Raise an error if the run has a trait that is not listed in `traits`.
+def stays_in_box(run: Any) -> None:
+    """Raise an error if disks leave or enter the box during the run."""
+    allow(run, "the script needs disks that stay in the box", *TRAITS.keys() - {"open"})
 
-    The error message ends with the text `law`.
-    """
+
+def allow(run: Any, law: str, *traits: str) -> None:
+    """Raise Refused, with a message that ends with `law`, for a trait not in `traits`."""
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:
             raise Refused(f"{getattr(run, 'path', 'the simulation')}: {reason}; {law}")

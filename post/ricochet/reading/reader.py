@@ -1,18 +1,14 @@
 """Read output files of Ricochet.
 
-Only the modules `reader`, `results` and `layout` depend on the layout of the HDF5 file.
-
-    from ricochet import read_run
-    run = read_run("runs/gas.h5")
-    run.time                 # (T,)    times of the frames
-    run.position[-1]         # (N, 2)  one frame, read from the file on demand
+    from ricochet import read_run run = read_run("runs/gas.h5") run.time                 # (T,)
+    times of the frames run.position[-1]         # (N, 2)  one frame, read from the file on demand
     run.speed(-1)            # (N,)    derived quantities take a frame, a slice or a list
     run.observable("all/kinetic_energy").value
 
-T is the number of frames, N the number of disks, and S the number of species.  All quantities are
-in the units of the input file ("reduced units").  Frames are read on demand, so a file may be
-larger than the memory of the computer.  A `.part` file, which the program is still writing, is read
-up to its last complete frame.
+T is the number of frames, N that of disks, and S that of species. All quantities are in the units
+of the input file. Frames are read on demand, so a file may be larger than the memory. A `.part`
+file, to which the program is still writing, is read up to its last complete frame. Only this module
+and the modules `results` and `layout` depend on the layout of the HDF5 file.
 """
 
 from collections.abc import Iterator
@@ -53,8 +49,8 @@ __all__ = [
 class Run(BoxResults):
     """The results of one run: arrays of constants, frames, and time series of observables.
 
-    `read_run` returns a `Run`.  T is the number of frames and N the number of disks.  All
-    quantities are in the units of the input file.
+    T is the number of frames and N that of disks; all quantities are in the units of the input
+    file. See `read_run`.
     """
 
     def __repr__(self) -> str:
@@ -87,7 +83,7 @@ class Run(BoxResults):
         )
 
     def of_species(self, name: str) -> np.ndarray:
-        """Return an array that is true for the disks of the given species.
+        """Return a mask of the disks of a species.
 
         Parameters
         ----------
@@ -97,7 +93,7 @@ class Run(BoxResults):
         Returns
         -------
         numpy.ndarray
-            (N,) array that is true for the disks of the species
+            (N,) mask
 
         Raises
         ------
@@ -155,11 +151,10 @@ class Run(BoxResults):
         return 0.5 * self.mass * np.sum(self.velocity[as_index(frame)] ** 2, axis=-1)
 
     def unwrapped(self, frame: Index) -> np.ndarray:
-        """Return positions that are continuous in time, also when disks cross periodic sides.
+        """Return positions that are continuous in time, even when disks cross periodic sides.
 
-        In a sheared box (Lees-Edwards boundary conditions), the periodic image above the box is
-        displaced along x by gamma L_y t.  Here gamma is the shear rate and L_y is the height of the
-        box.  If disks are recycled, continuous positions do not exist, and an error is raised.
+        In a sheared box (Lees-Edwards boundary conditions) the periodic image above the box is
+        displaced along x by gamma L_y t, with the shear rate gamma and the height L_y.
 
         Parameters
         ----------
@@ -171,13 +166,18 @@ class Run(BoxResults):
         numpy.ndarray
             (..., N, 2) positions [length]; equal to `position` along axes that are not periodic
 
+        Raises
+        ------
+        RunError
+            if disks are recycled, so that continuous positions do not exist
+
         Examples
         --------
         >>> apart = (run.unwrapped(-1) - run.position[-1]) / run.edges
         >>> bool(np.allclose(apart, np.round(apart), atol=1e-9))
         True
         """
-        allow(self, "displacements are not defined", *TRAITS.keys() - {"recycled"})
+        allow(self, "displacements are not defined", *TRAITS.keys() - {"recycled", "open"})
         frame = as_index(frame)
         if self.image is None:
             return self.position[frame]
@@ -191,8 +191,6 @@ class Run(BoxResults):
     def displacement(self, frame: Index, origin: int = 0) -> np.ndarray:
         """Return the distance of each disk from its position in a reference frame.
 
-        The distances include the displacements of disks across periodic sides.
-
         Parameters
         ----------
         frame : int, slice, list of int or numpy.ndarray
@@ -203,7 +201,7 @@ class Run(BoxResults):
         Returns
         -------
         numpy.ndarray
-            (..., N) distances [length]
+            (..., N) distances [length], across periodic sides
 
         Examples
         --------
@@ -218,13 +216,13 @@ class Run(BoxResults):
         Parameters
         ----------
         name : str
-            name in the file, such as "angular_velocity" or "orientation"; the attribute `disk_data`
-            contains all such quantities
+            one of `disk_data`, such as "angular_velocity" or "orientation"
 
         Returns
         -------
         Frames
-            (T, N) read from the file when it is indexed
+            values of shape (T, N); the values of a frame are read from the file when that frame is
+            selected by an index
 
         Raises
         ------
@@ -251,6 +249,33 @@ class Run(BoxResults):
         return self.per_disk("orientation")
 
     @property
+    def present(self) -> Frames | None:
+        """1 for disks in the box, 0 for disks outside (T, N); None if no disk leaves or enters."""
+        return self.disk_data.get("present")
+
+    def in_box(self, frame: int) -> np.ndarray:
+        """Return the indices of the disks that are in the box in a frame.
+
+        Parameters
+        ----------
+        frame : int
+            frame to use
+
+        Returns
+        -------
+        numpy.ndarray
+            (n,) indices, in ascending order; all disks of a closed system
+
+        Examples
+        --------
+        >>> len(run.in_box(-1)) == run.n_disks
+        True
+        """
+        if self.present is None:
+            return np.arange(self.n_disks)
+        return np.flatnonzero(self.present[frame])
+
+    @property
     def inertia(self) -> np.ndarray:
         """Moments of inertia (N,) of the disks."""
         return float(self.parameter("contact", "inertia", 0.5)) * self.mass * self.radius**2
@@ -258,14 +283,12 @@ class Run(BoxResults):
     def to_xarray(self) -> "xarray.Dataset":
         """Return the frames as an xarray Dataset; the package xarray must be installed.
 
-        The dimensions are "time", "disk" and "component" ("x" and "y").  The variables are all
-        quantities of the frames, and the mass, radius and species of each disk.  The attributes of
-        the Dataset are the path of the output file and the seed of the run.
-
         Returns
         -------
         xarray.Dataset
-            positions, velocities and the other quantities of the frames
+            all quantities of the frames, and mass, radius and species of each disk, with the
+            dimensions "time", "disk" and "component" ("x" and "y"); attributes are the path and the
+            seed
 
         Raises
         ------
@@ -295,12 +318,10 @@ class Run(BoxResults):
     def pressure(self, t1: float, t2: float) -> float:
         """Return the mean pressure between the two samples closest in time to `t1` and `t2`.
 
-        The pressure is (<K> + dW / (2 dt)) / <A>.  Here K is the kinetic energy, A the accessible
-        area, and dW the increase of the virial during the time dt between the two samples.  In a
-        sheared box, K is the kinetic energy relative to the mean flow.  Averages over time are
-        calculated with the trapezoidal rule.  Between walls this pressure is smaller than the mean
-        force per length of a wall: for equal disks of radius r in a square of side L, by the factor
-        1 - 2 r / L.
+        It is (<K> + dW / (2 dt)) / <A>, with the kinetic energy K (relative to the mean flow of a
+        sheared box), the accessible area A and the increase dW of the virial in the time dt; means
+        are trapezoidal. Between walls it is smaller than the force per length of a wall: for equal
+        disks of radius r in a square of side L, by the factor 1 - 2 r / L.
 
         Parameters
         ----------
@@ -325,7 +346,7 @@ class Run(BoxResults):
         """
         if self.shear_rate:
             return float(np.trace(self.pressure_tensor(t1, t2)) / 2)
-        allow(self, "its kinetic energy is no pressure", *TRAITS.keys() - {"random_walk"})
+        allow(self, "its kinetic energy is no pressure", *TRAITS.keys() - {"random_walk", "open"})
         time, kinetic = self._between("all/kinetic_energy", t1, t2)
         virial = np.diff(self._between("virial", t1, t2).value[[0, -1]])[0]
         duration, area = time[-1] - time[0], time_mean(time, self.accessible_area(time))
@@ -334,10 +355,9 @@ class Run(BoxResults):
     def pressure_tensor(self, t1: float, t2: float) -> np.ndarray:
         """Return the mean pressure tensor between the samples closest in time to `t1` and `t2`.
 
-        The component ab of the tensor is (<sum of m v_a v_b> + dW_ab / dt) / <A>.  Here A is the
-        accessible area, and dW the increase of the virial tensor during the time dt between the
-        samples.  The trace of the pressure tensor is twice the pressure.  The output file contains
-        the virial tensor if the input has `output.virial_tensor = .true.`, and in some other cases.
+        It is (<sum of m v_a v_b> + dW_ab / dt) / <A>, with the accessible area A and the increase
+        dW of the virial tensor (`output.virial_tensor = .true.`) in the time dt. Its trace is twice
+        the pressure.
 
         Parameters
         ----------
@@ -360,7 +380,7 @@ class Run(BoxResults):
         >>> bool(np.isclose(np.trace(tensor) / 2, run.pressure(0, run.time[-1])))
         True
         """
-        allow(self, "its kinetic energy is no pressure", *TRAITS.keys() - {"random_walk"})
+        allow(self, "its kinetic energy is no pressure", *TRAITS.keys() - {"random_walk", "open"})
         time, kinetic = self._between("kinetic_tensor", t1, t2)
         virial = np.subtract(*self._between("virial_tensor", t1, t2).value[[-1, 0]])
         duration, area = time[-1] - time[0], time_mean(time, self.accessible_area(time))
@@ -379,18 +399,12 @@ class Run(BoxResults):
 
     @property
     def restitution(self) -> float:
-        """Coefficient of restitution of two disks.
-
-        `restitution` is NaN if the coefficient depends on the species or on the velocity.
-        """
+        """Restitution of two disks; NaN if it depends on species or velocity."""
         return self.contact_law.xi if self.contact_law.law == "constant" else np.nan
 
     @property
     def contact_law(self) -> Restitution:
-        """Coefficient of restitution of two disks, and its dependence on the velocity.
-
-        The attribute `xi` is NaN if the coefficient depends on the species.
-        """
+        """Law of restitution of two disks; `xi` is NaN if it depends on the species."""
         contact = self.parameters.get("contact", {})
         values = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
         xi = float(values[0]) if len(values) == 1 else float("nan")
@@ -434,14 +448,14 @@ class Run(BoxResults):
 class Frame:
     """One frame of a run, whose arrays are read from the file on demand.
 
-    A loop `for frame in run` visits all frames, and `run[-1]` is the last frame.
+    `for frame in run` visits all frames, and `run[-1]` is the last one.
 
     Parameters
     ----------
     run : ricochet.Run
         the run that contains the frame
     index : int
-        number of the frame; the first frame has the number 0
+        number of the frame, from 0
 
     Examples
     --------
@@ -507,11 +521,7 @@ def read_run(path: str | Path) -> Run:
 
 
 def open_run(path: Path, folder: object = None) -> Run:
-    """Open the output file of a run.
-
-    Every object that reads the file keeps a reference to `folder`, so that a temporary folder is
-    not removed while it is needed.
-    """
+    """Open the output file of a run; `folder` exists as long as an object reads the file."""
     with open_file(path) as file:
         if DISKS not in file or "h5md" not in file:
             raise Unsound("an HDF5 file, but not of a Ricochet run")
@@ -535,6 +545,11 @@ def run_of(path: Path, file: h5py.File, folder: object = None) -> Run:
         if isinstance(item, h5py.Group) and "value" in item
     }
     parameters = tree(file["parameters"])
+    if "changes" in parameters:  # without those planned for a later time
+        made = str(parameters.pop("changes")).splitlines(keepends=True)
+        now = float(rows(disks["position/time"], count)[-1])
+        if made := [line for line in made if float(line.split(" ")[0]) <= now]:
+            parameters["changes"] = "".join(made)
     box = tree(disks["box"])
     periodic = np.array(box["boundary"]) == "periodic"
     plane = (count, len(disks["id"]), 2)

@@ -8,34 +8,33 @@ import numpy as np
 class EventLog(NamedTuple):
     """Arrays (E,) that describe the E events of a run in chronological order.
 
-    An event is a collision of disk `i` with another disk or with a boundary.  If `j` is positive,
-    `j` is the id of the second disk.  The values 0, -1, -2 and -3 of `j` denote the left, right,
-    bottom and top side of the box.  The values -4, -5, ... of `j` denote the circular obstacles
-    and arcs, followed by the straight walls.  `momentum_change` is the momentum change of disk `i`.
+    An event is a collision of disk `i` with another disk or with a boundary. A positive `j` is the
+    id of the second disk; 0, -1, -2 and -3 denote the left, right, bottom and top side of the box,
+    and -4, -5, ... the circular obstacles and arcs, followed by the straight walls.
     """
 
     time: np.ndarray
     i: np.ndarray  # id of a disk
     j: np.ndarray
-    impulse: np.ndarray  # magnitude of the change of momentum
+    impulse: np.ndarray  # magnitude of the momentum change
     momentum_change: np.ndarray | None = None  # (E, 2) of disk i; None in files of older versions
 
 
 class Event(NamedTuple):
-    """One event, described by the same quantities as in `EventLog`."""
+    """One event, with the quantities of `EventLog`."""
 
     time: float
     i: int  # id of a disk
     j: int
-    impulse: float  # magnitude of the change of momentum
+    impulse: float  # magnitude of the momentum change
     momentum_change: np.ndarray  # (2,) of disk i
 
 
 class Obstacle(NamedTuple):
     """A circular obstacle, which encloses the disks if `inside` is true, or an arc of a circle.
 
-    An arc extends counter-clockwise from the angle `from_angle` to the angle `to_angle`, in
-    degrees.  For a whole circle the two angles are None.
+    An arc extends counter-clockwise from `from_angle` to `to_angle` [degrees], both None for a
+    circle.
     """
 
     centre: np.ndarray
@@ -86,7 +85,7 @@ class Obstacle(NamedTuple):
         return self.points(2)
 
     def points(self, count: int) -> np.ndarray:
-        """Return points of the outline at equal distances, from the first to the last point.
+        """Return equidistant points of the outline, from the first to the last.
 
         Parameters
         ----------
@@ -112,10 +111,7 @@ class Obstacle(NamedTuple):
 
 
 class Species(NamedTuple):
-    """One species of disks, with the properties of its disks.
-
-    Masses and radii can differ within a species if a starting file specifies them.
-    """
+    """One species of disks; masses and radii differ within it if they are read from a file."""
 
     name: str
     masses: np.ndarray  # (n,)
@@ -129,12 +125,12 @@ class Species(NamedTuple):
 
     @property
     def mass(self) -> float:
-        """Mass of each disk, or the mean mass if the masses of the disks differ."""
+        """Mass of each disk, or the mean mass if the disks differ."""
         return float(self.masses[0] if self.alike else self.masses.mean())
 
     @property
     def radius(self) -> float:
-        """Radius of each disk, or the mean radius if the radii of the disks differ."""
+        """Radius of each disk, or the mean radius if the disks differ."""
         return float(self.radii[0] if self.alike else self.radii.mean())
 
     @property
@@ -143,12 +139,24 @@ class Species(NamedTuple):
         return f"{self.name}, m = {span(self.masses)}"
 
 
+class Change(NamedTuple):
+    """A change of a variable during a run; an empty `value` stands for the default."""
+
+    time: float
+    name: str
+    value: str
+
+
+def changes_in(text: str) -> list[Change]:
+    """Return the changes described by lines of the form TIME GROUP.VARIABLE=VALUE."""
+    lines = (line.partition(" ") for line in text.splitlines())
+    return [Change(float(time), *rest.partition("=")[::2]) for time, _, rest in lines]
+
+
 class Restitution(NamedTuple):
     """Coefficient of normal restitution of a pair of disks.
 
-    If `law` is "constant", the coefficient is `xi` for all impact velocities.  If `law` is not
-    "constant", the coefficient is `xi` for impact velocities above `speed`, and depends on the
-    impact velocity below `speed`.
+    With the `law` "constant" it is `xi` for all impact velocities, otherwise only above `speed`.
     """
 
     xi: float
@@ -165,11 +173,14 @@ class Restitution(NamedTuple):
         return self.xi if self.law == "constant" else f"{self:g}"
 
     def at(self, g: np.ndarray) -> np.ndarray:
-        """Return the coefficients of restitution for an array `g` of normal impact velocities.
+        """Return the coefficients of restitution for normal impact velocities `g`, an array.
 
-        The coefficient is 1 - y + c y^2, where y is proportional to g^(1/5): see Ramirez and
-        others, Physical Review E 60, 4465 (1999).
+        The velocity-dependent law is 1 - y + c y^2 with y proportional to g^(1/5) (Ramirez and
+        others, Physical Review E 60, 4465 (1999)). "elastic_below" is 1 minus a rounding error
+        below `speed`, so that a gas has a finite, though very long, cooling time at all energies.
         """
+        if self.law == "elastic_below":
+            return np.where(g < self.speed, np.nextafter(1.0, 0.0), self.xi)
         c = {"power": 0.0, "viscoelastic": 0.6}[self.law]
         y = 2 * (1 - self.xi) / (1 + np.sqrt(1 - 4 * c * (1 - self.xi)))
         y = y * np.minimum(g / self.speed, 1.0) ** 0.2
@@ -177,6 +188,6 @@ class Restitution(NamedTuple):
 
 
 def span(values: np.ndarray, digits: int = 6) -> str:
-    """Return the smallest and largest value as text, or one value if all values are equal."""
+    """Return the smallest and largest value as text, or one value if all are equal."""
     ends = (f"{values.min():.{digits}g}", f"{values.max():.{digits}g}")
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)

@@ -17,6 +17,7 @@ from .units import UNNAMED, Units
 if TYPE_CHECKING:
     import pandas
 
+CHUNK = 10**6  # largest number of disks in frames that are read together
 SIDES = ("left", "right", "bottom", "top")
 TENSORS = ("virial_tensor", "kinetic_tensor", "helfand_stress")
 
@@ -58,7 +59,7 @@ class Results:
         return len(self.time)
 
     def parameter(self, group: str, variable: str, default: Any = None) -> Any:
-        """Return the value of an input variable in the run, or its default value if it was not set.
+        """Return the value of an input variable in the run.
 
         Parameters
         ----------
@@ -85,8 +86,7 @@ class Results:
         Parameters
         ----------
         name : str
-            name in the file, such as "total_energy" or "sides/left/impulse"; the attribute
-            `observables` contains all names
+            one of `observables`, such as "total_energy" or "sides/left/impulse"
 
         Returns
         -------
@@ -120,16 +120,13 @@ class Results:
             return tuple(series_in(file["observables"]))
 
     def to_dataframe(self) -> "pandas.DataFrame":
-        """Return the observables as a pandas DataFrame, which has one row for each sample.
-
-        The index of the DataFrame is the time.  The columns of the DataFrame have the names of the
-        observables, such as `all/kinetic_energy`.  Each component of a vector or tensor has its own
-        column, such as `momentum_x` or `virial_tensor_xy`.
+        """Return the observables as a pandas DataFrame with a row for each sample.
 
         Returns
         -------
         pandas.DataFrame
-            (T', columns) of numbers
+            (T', columns), indexed by time; columns are names such as `all/kinetic_energy`, and
+            components such as `momentum_x` and `virial_tensor_xy`
 
         Raises
         ------
@@ -200,9 +197,8 @@ class Results:
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
         """Return the mean number of collisions with other disks per disk at the given times.
 
-        The number of collisions is interpolated between the samples of the observables.  If the
-        file has more frames than samples of the observables, the interpolation also uses the event
-        counts of the frames.
+        It is interpolated between samples of the observables and, if there are more frames than
+        samples, between event counts of the frames.
 
         Parameters
         ----------
@@ -235,7 +231,9 @@ class Results:
         """Mean number (T,) of events per disk between the start and each frame."""
         if self.event_count is None:
             raise RunError(f"{self.path}: has no event_count in its frames")
-        return np.array([self.event_count[k].mean() for k in range(self.n_frames)])
+        step = max(1, CHUNK // self.n_disks)
+        parts = [self.event_count[k : k + step] for k in range(0, max(1, self.n_frames), step)]
+        return np.concatenate([part.mean(axis=1) for part in parts])
 
     @cached_property
     def nature(self) -> Nature:

@@ -1,8 +1,6 @@
-"""Names of units, which appear in the labels of axes.
+"""Names of units in the labels of axes.
 
-The numbers in an input file have no units.  The author of the file decides which unit of length a
-number refers to, for example a metre or the diameter of a disk.  The names of units change only
-labels in figures and no numbers.
+The numbers in an input file have no units, and names of units change labels but no numbers.
 """
 
 from typing import NamedTuple
@@ -38,18 +36,14 @@ class Units(NamedTuple):
     def label(self, words: str, quantity: str = "") -> str:
         """Return the label of an axis, for example 'time (s)' or 'time (reduced units)'.
 
-        The unit is found in `POWERS` by the key `quantity` or, if `quantity` is empty, by `words`.
-        The unit of a probability density is that of the reciprocal of a quantity, for example
-        '1/speed'.
+        `POWERS` contains the unit for the key `quantity` or, if it is empty, `words`; that of a
+        probability density is the reciprocal of a quantity, such as '1/speed'.
         """
         unit = self.name(quantity or words)
         return f"{words} ({unit})" if unit else words
 
     def coordinate(self, name: str) -> str:
-        """Return the label of an axis of a picture of the box, for example 'x (m)'.
-
-        Without the name of a unit the label is only 'x', because these axes are short.
-        """
+        """Return the short label of an axis of the box: 'x (m)', or 'x' without a unit."""
         return f"{name} ({self.length})" if self.length else name
 
     def name(self, quantity: str) -> str:

@@ -64,6 +64,7 @@ def library(files: bool = False) -> ctypes.CDLL:
         "observables": (n, p, text, n, p),
         "next_events": (n, p, n, p),
         "change": (n, p, text, *answer),
+        "schedule": (n, p, real, text, *answer),
         "set_velocities": (n, p, p, *answer),
         "set_positions": (n, p, p, *answer),
         "text": (n, p, text, text, n),

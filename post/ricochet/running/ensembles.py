@@ -1,13 +1,12 @@
 """Sweeps (many runs of one input in parallel) and tables of their results.
 
-    values = {"contact.restitution": [0.8, 0.9], "run.seed": range(8)}
-    table = ricochet.sweep("input/gas.nml", values, "runs/scan")
-    table = ricochet.ensemble("runs/scan")       # a row per member run; also for runs/ensemble.sh
+    values = {"contact.restitution": [0.8, 0.9], "run.seed": range(8)} table =
+    ricochet.sweep("input/gas.nml", values, "runs/scan") table = ricochet.ensemble("runs/scan")
+    # a row per member run; also for runs/ensemble.sh
 
-A sweep can be interrupted at any time; the same call of `sweep` then continues the sweep.  The
-folder of a sweep contains input.nml, manifest.txt with the overrides of each member run, and the
-files NAME.h5 and NAME.log of each member run.  The script `runs/ensemble.sh` writes the same files;
-therefore `sweep` can continue member runs that `runs/ensemble.sh` started, and vice versa.
+A sweep can be interrupted at any time, and the same call continues it. Its folder contains
+input.nml, manifest.txt with the overrides of each member, and NAME.h5 and NAME.log of each member.
+`runs/ensemble.sh` writes the same files, so that each can continue member runs of the other.
 """
 
 import contextlib
@@ -56,25 +55,20 @@ def sweep(
 ) -> "pandas.DataFrame":
     """Run an input with all combinations of the given values of variables.
 
-    Finished member runs are not repeated, and interrupted member runs are continued.  If a sweep
-    was interrupted, a call of `sweep` with the same arguments continues it.
-
-    If the input has changed only in variables that may change when a run is resumed, such as the
-    end of the run or the sampling schedule, finished member runs are extended.
+    Interrupted member runs are continued, and finished ones are not repeated. They are extended if
+    the input has changed in variables that may change on a resume, such as the end of the run.
 
     Parameters
     ----------
     system : str, Path or mapping
         the input, as for `ricochet.run`
     values : mapping of str to object, or list of them
-        a dictionary that contains, for each variable, a list of values or a single value; the value
-        None stands for the default value of the variable.  The member runs are ordered such that
-        the first variable varies slowest.  If `values` is a list of dictionaries, `sweep` runs the
-        combinations of values in each dictionary, so that several variables can be varied together
+        a value or a list of values for each variable (None: its default), of which the first varies
+        slowest; a list of such dictionaries varies several variables together
     folder : str or Path
         folder for the files of the member runs
     executor : concurrent.futures.Executor, optional
-        executor that runs the members and has access to the folder [all cores of this machine]
+        executor with access to the folder [all cores of this machine]
 
     Returns
     -------
@@ -84,10 +78,9 @@ def sweep(
     Raises
     ------
     ProgramError
-        if the program refuses the input of a member run; all inputs are checked before the first
-        run
+        if the program refuses the input of a member; all are checked before the first run
     RunError
-        if the folder or a member's log cannot be used, or if a member's name would be too long
+        if the folder or a log cannot be used, or the name of a member would be too long
     ValueError
         if `values` is empty
 
@@ -154,8 +147,7 @@ def combinations(choices: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
 def check(text: str, members: Iterable[Mapping[str, Any]]) -> None:
     """Raise an error for values that the program refuses.
 
-    Each value of a variable is checked once, in the first member run that uses this value; seeds
-    are not checked.
+    Each value of a variable is checked once, in the first member run that uses it; seeds are not.
     """
     known: set[str] = set()
     for settings in members:
@@ -285,8 +277,7 @@ def put(path: Path, text: str) -> None:
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
     """Return the paths of the finished and the unfinished output of a member run, or None.
 
-    While a finished run is being extended, both its finished output and an unfinished output exist,
-    and the member run is regarded as unfinished.
+    Both exist while a finished run is being extended; it then counts as unfinished.
     """
     whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
     unfinished = part if part.is_file() else None
@@ -361,8 +352,7 @@ def is_there(pid: int) -> bool:
 def wanted(mark: Path) -> bool:
     """Return whether the call of `sweep` that created the file `mark` is still in progress.
 
-    If a process of this machine created the file `mark` and no longer exists, the function deletes
-    the file.
+    The file is deleted if the process on this machine that created it no longer exists.
     """
     _, pid, _, host = mark.name.split(" ", 3)
     if host == os.uname().nodename and not is_there(int(pid)):
@@ -387,10 +377,7 @@ def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
 
 
 def pairs_of(overrides: str) -> Iterator[tuple[str, str]]:
-    """Yield variable and value of each override in a line of a manifest.
-
-    A value in quotes may contain the text `--set`.
-    """
+    """Yield variable and value of each override in a line of a manifest, also of quoted values."""
     parts = overrides.removeprefix("--set ").split(" --set ") if overrides else []
     while parts:
         part = parts.pop(0)
@@ -422,14 +409,14 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
     Parameters
     ----------
     folder : str or Path
-        folder of a sweep, which `sweep` or runs/ensemble.sh made
+        folder that `sweep` or runs/ensemble.sh made
 
     Returns
     -------
     pandas.DataFrame
-        a row for each member run.  The columns are the name `member`, each override by its full
-        name, `seed`, `state` ('finished', 'unfinished' or 'failed'), the `reason` why the run is
-        not finished, `wall_time` [s], and the last value of each scalar observable
+        a row per member: `member`, each override by its full name, `seed`, `state` ('finished',
+        'unfinished' or 'failed') and its `reason`, `wall_time` [s], and the last value of each
+        scalar observable
 
     Raises
     ------
@@ -507,8 +494,7 @@ def typed(value: str) -> object:
 def last_values(path: Path) -> dict[str, Any]:
     """Return seed, wall time and the last value of each scalar observable of a run.
 
-    Because a sweep can have 10^5 files, the file is read with the low-level functions of h5py,
-    which take half of the time of its high-level interface.
+    The low-level functions of h5py read the up to 10^5 files of a sweep in half of the time.
     """
     with open_file(path) as file:
         row = {"seed": plain(file["parameters/run"].attrs["seed"])}

@@ -1,7 +1,6 @@
 """Run the program from Python with an input file or a dictionary, and return a `Run`.
 
-The program reports its progress only to a terminal; therefore its standard error is connected to a
-pseudo-terminal.
+Its standard error is a pseudo-terminal, because it reports its progress only to a terminal.
 """
 
 import os
@@ -32,10 +31,10 @@ ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
 
 class ProgramError(RunError):
-    """Error that is raised if the program cannot start or does not finish.
+    """Error raised if the program cannot start or does not finish.
 
-    The attribute `message` contains the lines that the program printed, and `code` is the exit code
-    of the program.  The attribute `path` is the file with the completed part of the run, or None.
+    `message` contains the lines that the program printed, `code` is its exit code, and `path` the
+    file with the completed part of the run, or None.
     """
 
     def __init__(self, message: str, code: int, path: Path | None = None):
@@ -63,14 +62,13 @@ def run(
     ----------
     system : str, Path or mapping
         an input file, the text of an input, or a dictionary of its groups, such as `{"species":
-        {"count": 9, "radius": 0.1}}`.  The value of a repeated group is a list of dictionaries.
-        The radius, mass, angular_velocity and orientation of a species may be arrays with a value
-        for each position
+        {"count": 9, "radius": 0.1}}`; a repeated group is a list of dictionaries; radius, mass,
+        angular_velocity and orientation may be arrays with a value for each position
     overrides : mapping of str to object, optional
-        values of variables that replace those of the input, such as `{"species.gas.mass": 2}` or
-        `{"contact": {"restitution": 0.9}}`; None stands for the default value of a variable
+        values that replace those of the input, such as `{"species.gas.mass": 2}` or `{"contact":
+        {"restitution": 0.9}}`; None stands for the default of a variable
     output : str or Path, optional
-        the output file [a temporary file, which is deleted when no object uses the file any more]
+        the output file [a temporary file, deleted when no object uses it any more]
     force, resume : bool
         whether the program is started with the option `--force` or `--resume`
     threads : int, optional
@@ -87,7 +85,7 @@ def run(
     Raises
     ------
     ProgramError
-        if the program reports an error, which the attributes of the exception describe
+        if the program reports an error
 
     Examples
     --------
@@ -142,7 +140,7 @@ def example(name: str) -> Path:
     Raises
     ------
     RunError
-        if there is no input file with this name; the message lists the existing names
+        if there is no such file; with the existing names
 
     Examples
     --------
@@ -168,11 +166,9 @@ def whole_threads(threads: int | None) -> int:
 
 
 def find_program() -> str:
-    """Return the path of the program.
+    """Return the path of the program: the variable RICOCHET, or the first one found.
 
-    If the environment variable RICOCHET is set, its value is the path of the program.  If RICOCHET
-    is not set, the function searches for the program in the installed package, in the folder
-    `build` of this clone, and on PATH.
+    It is sought in the installed package, in the folder `build` of this clone, and on PATH.
     """
     root = HERE.parents[1]
     if wish := os.environ.get("RICOCHET"):
@@ -229,12 +225,10 @@ def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
 
 
 def tied(command: list[str]) -> list[str]:
-    """Return a command that receives the signal SIGTERM when this Python process ends.
+    """Return a command that receives SIGTERM, and writes a checkpoint, when this process ends.
 
-    When the program receives SIGTERM, the program writes a checkpoint and ends.  The returned
-    command starts the program with the tool setpriv of util-linux, which requests the signal; if
-    setpriv is not available, the program does not receive the signal.  A Python function that
-    requests the signal between fork and exec would not be safe in a process with several threads.
+    The tool setpriv of util-linux requests the signal, if it is available. A Python function
+    between fork and exec would not be safe in a process with several threads.
     """
     setpriv = shutil.which("setpriv") if sys.platform == "linux" else None
     return [setpriv, "--pdeathsig", "TERM", "--", *command] if setpriv else command
@@ -258,7 +252,7 @@ def lines_from(terminal: int) -> Iterator[str]:
 
 
 def unseen(system: str | Path | Mapping[str, Any], place: Path | None = None) -> str | None:
-    """Return the text of an input that is a text or a dictionary, or None if the input is a file.
+    """Return the text of an input given as a text or a dictionary, or None for a file.
 
     Arrays with a value for each disk are written to starting files in the folder of `place`, by
     default in a temporary folder of this process.

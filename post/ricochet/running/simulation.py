@@ -4,9 +4,8 @@
         gas.advance(time=1.0)
         gas.position, gas.observable("all/kinetic_energy"), gas.next_events(3)
 
-The library (`make library`) contains the engine of the program.  For the same input, the state of a
-`Simulation` is bit-identical to the state in a run of `build/ricochet`.  The state does not depend
-on the intermediate times at which `advance` returned.
+The library (`make library`) contains the engine of the program. The state is bit-identical to that
+in a run of `build/ricochet` with the same input, whatever the times at which `advance` returned.
 """
 
 import math
@@ -44,15 +43,15 @@ class Simulation(State):
     system : str, Path or mapping
         an input file, the text of an input, or a dictionary of its groups, as for `ricochet.run`
     overrides : mapping of str to object, optional
-        values of variables, as for `ricochet.run`, such as {"contact.restitution": 0.9} or
-        {"contact": {"restitution": 0.9}}
+        values of variables, such as {"contact.restitution": 0.9} or {"contact": {"restitution":
+        0.9}}
     threads : int, optional
         number of threads [that of the input, or one]
 
     Raises
     ------
     ProgramError
-        if the input contains an error; the exception contains the message of the program
+        if the input contains an error; with the message of the program
 
     Examples
     --------
@@ -109,12 +108,12 @@ class Simulation(State):
 
     @classmethod
     def load(cls, path: str | Path, threads: int | None = None) -> Self:
-        """Return a simulation in the state of the last checkpoint of a finished or unfinished run.
+        """Return a simulation in the state of the last checkpoint of a run.
 
         Parameters
         ----------
         path : str or Path
-            the output file of the run, or the unfinished output, whose name ends in `.part`
+            the output file, or the unfinished output, whose name ends in `.part`
         threads : int, optional
             number of threads [that of the input, or one]
 
@@ -142,26 +141,25 @@ class Simulation(State):
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
         """Write an output file that the command `ricochet INPUT -o path --resume` can continue.
 
-        The output file that `save` writes contains the present state, and the samples of the
-        initial state (after a change: of the present state).  It needs space for these data only;
-        the command checks the space for the rest of the run.  If variables have been changed with
-        `change`, INPUT must be a file with the changed values; `save` writes this file if the
-        argument `input` is given.
+        The file contains the present state, and samples of the initial state (after a change: of
+        the present one). The command checks the space for the rest of the run. If variables were
+        changed with `change`, INPUT must contain the new values; the argument `input` writes this
+        file.
 
         Parameters
         ----------
         path : str or Path
-            the output file of the run that will continue
+            output file of the run that will continue
         force : bool
             whether an existing file may be replaced
         input : str or Path, optional
-            file to which the present input is written; the file must be new, or written by an
-            earlier `save` and not edited since
+            file for the input with which the program continues the run: a new one, or one of an
+            earlier `save` that was not edited since
 
         Returns
         -------
         Path
-            the path of the file, which is `path` with `.part` at its end
+            `path` with `.part` at its end
 
         Raises
         ------
@@ -181,16 +179,15 @@ class Simulation(State):
         with self._open() as handle:
             called(library(files=True).ricochet_save, handle, c_text(path), int(force))
         if input is not None:
-            write_input(Path(input), self.input)
+            write_input(Path(input), self._text("saved input"))
         return path.with_name(f"{path.name}.part")
 
     def copy(self) -> Self:
         """Return an independent simulation in the same state.
 
-        The copy and the original remain bit-identical if the same methods are called on both of
-        them.  The functions `copy.copy`, `copy.deepcopy` and `pickle.dumps` also copy a simulation.
-        A pickle contains a checkpoint, so that another process can load the pickle.  If the input
-        names a starting file, this file must exist when the pickle is loaded.
+        Copy and original remain bit-identical as long as the same methods are called. `copy.copy`,
+        `copy.deepcopy` and pickles work as well. A pickle contains a checkpoint for another
+        process, which needs the starting file that the input names, if any.
 
         Returns
         -------
@@ -228,41 +225,35 @@ class Simulation(State):
         events: int | None = None,
         on_event: Callable[[Event], object] | None = None,
     ) -> Self:
-        """Advance the simulation until one of the limits is reached.
+        """Advance the simulation until one of the limits, each counted from the start, is reached.
 
-        The limits of `advance` are times and numbers since the start of the run.  Without limits,
-        the stop rules of the input apply.  As in a run of the program, the simulation ends before a
-        limit if no further event can occur, or if a gas that only loses energy has cooled to 1e-25
-        of its initial temperature.  After an interrupt (Ctrl-C), the simulation is in the state at
-        the time of the interrupt and can be continued.
+        Without limits, the stop rules of the input apply. As in a run of the program, it ends
+        earlier if no further event can occur, or if a freely cooling gas has 1e-25 of its initial
+        temperature. After an interrupt (Ctrl-C) the simulation can be continued.
 
         Parameters
         ----------
         time : float, optional
-            time since the start
+            time
         collisions : int, optional
             number of collisions of two disks
         events : int, optional
-            number of events (collisions of any kind).  `advance` ends exactly at a number of events
-            or collisions, if necessary between simultaneous events, and the next call continues
-            with the remaining ones.  Only time steps are always completed
+            number of events (collisions of any kind); this limit and that of `collisions` are
+            exact, even between simultaneous events, except that time steps are always completed
         on_event : callable, optional
-            function that is called with an `Event` after each event.  The function `on_event` may
-            read and change the simulation, which is in the state just after the event.  If
-            `on_event` returns a true value, `advance` ends after this event, even if simultaneous
-            events are still to come.  If `on_event` is given, each event takes about 20
-            microseconds
+            function that receives an `Event` after each event, and may read and change the
+            simulation; if it returns a true value, the simulation stops after this event or, with
+            time steps, after all events of the step; each event takes about 20 microseconds
 
         Returns
         -------
         Simulation
-            the simulation itself, so that further methods can be called
+            the simulation itself
 
         Raises
         ------
         ValueError
-            if a limit has already been passed, or if neither the arguments nor the input set a
-            limit
+            if a limit has been passed, or if neither the arguments nor the input set a limit
         RunError
             if no further event can occur, so that no limit can be reached
         ProgramError
@@ -319,7 +310,7 @@ class Simulation(State):
         Parameters
         ----------
         time : float, optional
-            duration by which to advance
+            duration
         collisions : int, optional
             number of further collisions of two disks
         events : int, optional
@@ -330,12 +321,12 @@ class Simulation(State):
         Returns
         -------
         Simulation
-            the simulation itself, so that further methods can be called
+            the simulation itself
 
         Raises
         ------
         ValueError
-            if no value is given, or if a value is negative
+            if no value is given, or a value is negative
 
         Examples
         --------
@@ -382,12 +373,9 @@ class Simulation(State):
     def _settle(self) -> float:
         """Advance to a time at which another simulation can reproduce the state; return this time.
 
-        After a call of `advance`, the attribute `time` may be rounded, and the engine may still
-        have to shift its origin of time.  Therefore `_settle` advances to a slightly later time t
-        that the engine reaches exactly, so that another simulation that advances to t reaches the
-        same state.  The engine computes the time of a simulation as the sum of the origin of time
-        and the time since this origin.  Because not every floating-point number can be the sum of
-        the origin and the time since the origin, `_settle` tries several values of t.
+        `time` may be rounded after `advance`, and the engine may still have to shift its origin of
+        time. The time returned is slightly later and is reached exactly. It is the sum of the
+        origin and the time since the origin; not every number is such a sum, so several are tried.
         """
         ulps = 0
         while self.time != self._settled:
@@ -399,28 +387,25 @@ class Simulation(State):
     def change(self, values: Mapping[str, Any]) -> Self:
         """Change variables of the simulation at the present time.
 
-        The variables that can change are gravity, the driving, the collision rules of disks and
-        boundaries, and the temperatures, velocities and motions of boundaries.  A change of the
-        total energy by this method is added to the observable `work`.
-
-        A side starts a new motion where it is.  Variables of its former motion that the new motion
-        does not have, such as the force on a piston that is held, are dropped.
+        Gravity, driving, collision rules, and temperatures, velocities and motions of boundaries
+        can change. The change of the total energy is added to the observable `work`. A side starts
+        a new motion where it is; variables that only its former motion has, such as the force on a
+        piston, are dropped.
 
         Parameters
         ----------
         values : mapping of str to object
-            a dictionary with the new value of each variable; the keys are the full names of the
-            variables, such as "box.gravity"
+            new values by the full names of variables, such as "box.gravity"
 
         Returns
         -------
         Simulation
-            the simulation itself, so that further methods can be called
+            the simulation itself
 
         Raises
         ------
         ProgramError
-            if a variable cannot be changed; in this case all variables keep their values
+            if a variable cannot be changed; all variables then keep their values
 
         Examples
         --------
@@ -434,6 +419,51 @@ class Simulation(State):
         except ProgramError as problem:
             message = without_options(problem.message, settings)
             raise ProgramError(message, problem.code) from None
+
+    def schedule(self, time: float, values: Mapping[str, Any]) -> Self:
+        """Plan a change of variables at a later time, as a group `&change` of the input does.
+
+        `advance` makes the change when all collisions at this time have been executed, and before
+        kicks at this time. Planned changes are included in the files that `save` writes, in copies
+        and in pickles.
+
+        Parameters
+        ----------
+        time : float
+            when the change takes place: time since the start of the run, later than the present
+            time
+        values : mapping of str to object
+            new values, as for `change`
+
+        Returns
+        -------
+        Simulation
+            the simulation itself
+
+        Raises
+        ------
+        ProgramError
+            if a variable cannot be changed, or the time has passed; nothing is then planned
+
+        Examples
+        --------
+        >>> with ricochet.Simulation(small) as box:
+        ...     _ = box.schedule(0.1, {"box.gravity": (0, -1)})
+        ...     box.changes, box.advance(time=0.2).changes
+        ([], [(0.1, 'box.gravity', '0, -1')])
+        """
+        settings = settings_of(values)
+        try:
+            return self._schedule(time, settings)
+        except ProgramError as problem:
+            message = without_options(problem.message, settings)
+            raise ProgramError(message, problem.code) from None
+
+    def _schedule(self, time: float, settings: list[str]) -> Self:
+        lines = c_text("\n".join(settings))
+        with self._open() as handle:
+            called(library().ricochet_schedule, handle, float(time), lines)
+        return self
 
     def _change(self, settings: list[str]) -> Self:
         with self._open() as handle:

@@ -25,8 +25,7 @@ NUMBERS = itertools.count(1)
 def with_start(group: Mapping[str, Any], place: Path | None) -> Mapping[str, Any]:
     """Write the arrays of a species to a starting file; return a species that names this file.
 
-    The path of the starting file begins with the path `place`.  If `place` is None, the file is
-    temporary and exists until this process ends.
+    Its path begins with `place`; if that is None, it exists until this process ends.
     """
     columns = {name: group[name] for name in PER_DISK if np.size(group.get(name, 0)) > 1}
     if not columns:
@@ -64,10 +63,9 @@ def write_start(
 ) -> Path:
     """Write a starting file, which the variable `file` of a species in an input can name.
 
-    The input determines the quantities that the starting file does not contain.  If a NumPy file
-    contains arrays with the names of the parameters, the call `write_start("bed.txt",
-    **np.load("a.npz"))` writes these arrays.  Numbers are written with 17 significant digits, so
-    that a reader of the file obtains exactly the original values.
+    The input determines quantities that the file does not contain. Numbers have 17 significant
+    digits, so that they are read exactly. `write_start("bed.txt", **np.load("a.npz"))` converts a
+    NumPy file.
 
     Parameters
     ----------
@@ -80,20 +78,19 @@ def write_start(
     radius, mass : array_like, optional
         (N,), or one value for all disks
     species : array_like, optional
-        (N,), or one value for all disks: names of species, or numbers of species in the input,
-        which are counted from 1
+        (N,), or one value for all disks: names, or numbers in the input from 1
     angular_velocity, orientation : array_like, optional
         (N,), or one value for all disks [1/time], [rad]
 
     Returns
     -------
     Path
-        the path of the starting file
+        the path of the file
 
     Raises
     ------
     ValueError
-        if an array has a wrong shape or contains values that are not allowed
+        if an array has a wrong shape or values that are not allowed
 
     Examples
     --------

@@ -12,6 +12,7 @@ from ..reading.arrays import snapshot
 from ..reading.files import RunError, did_you_mean
 from ..reading.nature import Nature, nature_of
 from ..reading.reader import EventLog
+from ..reading.records import changes_in
 from .engine import ROOM, called, library
 from .session import Session
 from .starting import real_numbers
@@ -24,6 +25,7 @@ COLUMNS = {
     "angular_velocity": float,
     "orientation": float,
     "image": np.int64,
+    "present": np.int64,
     "recycled": np.int64,
     "radius": float,
     "mass": float,
@@ -45,11 +47,8 @@ class State(Session):
     @property
     def changes(self) -> list[tuple[float, str, str]]:
         """Time, name of the variable, and new value of each change during the simulation."""
-        found = []
-        for line in self._text("changes").splitlines():
-            time, _, rest = line.partition(" ")
-            found.append((float(time), *rest.partition("=")[::2]))
-        return found
+        found = changes_in(self._text("changes"))
+        return [(time, name, value) for time, name, value in found]
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -132,23 +131,21 @@ class State(Session):
     def position(self) -> np.ndarray:
         """Positions of the disks, (N, 2) [length], as a read-only copy.
 
-        Along a periodic axis, all positions are inside the box.  All positions can be set at once,
-        if no disks overlap at the new positions; the change of the total energy is then added to
-        the observable `work`.
+        They are inside the box along periodic axes. All can be set at once if no disks then
+        overlap; the change of the total energy is added to the observable `work`.
         """
         return self._column("position")
 
     @position.setter
     def position(self, value: ArrayLike) -> None:
-        if not np.array_equal(value, self.position):
+        if not np.array_equal(value, self.position, equal_nan=True):
             self._set("position", value, library().ricochet_set_positions)
 
     @property
     def velocity(self) -> np.ndarray:
         """Velocities of the disks, (N, 2) [length/time], as a read-only copy.
 
-        All velocities can be set at once; the change of the total energy is then added to the
-        observable `work`.
+        All can be set at once; the change of the total energy is added to the observable `work`.
         """
         return self._column("velocity")
 
@@ -161,7 +158,9 @@ class State(Session):
         array = np.ascontiguousarray(real_numbers(name, value), dtype=float)
         if array.shape != (self.n_disks, 2):
             raise ValueError(f"{name}: has the shape {array.shape}, not ({self.n_disks}, 2)")
-        if not np.abs(array).max() < FASTEST:
+        present = getattr(self, "present", None)  # which closed systems lack
+        inside = slice(None) if present is None else present.astype(bool)
+        if not np.abs(array[inside]).max(initial=0) < FASTEST:
             raise ValueError(f"{name}: has values that are not below {FASTEST:g}")
         with self._open() as handle:
             called(function, handle, array.ctypes.data)
@@ -173,27 +172,34 @@ class State(Session):
 
     @property
     def orientation(self) -> np.ndarray:
-        """Orientations of the disks, (N,) [rad].
+        """Angles of the disks from the x axis, (N,) [rad], not reduced modulo 2 pi.
 
-        An orientation is an angle from the x axis, which is not reduced modulo 2 pi.  If the disks
-        have no orientations, AttributeError is raised.
+        AttributeError is raised if the disks have no orientations.
         """
         return self._column("orientation")
 
     @property
     def image(self) -> np.ndarray:
-        """Number of box lengths that each disk has moved across periodic sides, (N, 2).
+        """Image counters (N, 2): box lengths to add to a position for a continuous path.
 
-        To obtain a continuous path of a disk, add to its positions the box lengths that it has
-        moved across periodic sides.  If no side is periodic, AttributeError is raised.
+        AttributeError is raised if no side is periodic.
         """
         return self._column("image")
+
+    @property
+    def present(self) -> np.ndarray:
+        """1 for each disk in the box and 0 for each disk outside, (N,).
+
+        Positions, velocities and angles of disks outside are NaN, and ignored when they are set.
+        AttributeError is raised if no disk can leave or enter the box.
+        """
+        return self._column("present")
 
     @property
     def recycled(self) -> np.ndarray:
         """Number of times that each disk has been recycled, (N,).
 
-        If the driving does not recycle disks, AttributeError is raised.
+        AttributeError is raised if the driving does not recycle disks.
         """
         return self._column("recycled")
 
@@ -240,8 +246,7 @@ class State(Session):
         Parameters
         ----------
         name : str
-            name of the observable in the output file, such as "all/kinetic_energy"; the attribute
-            `observables` lists all names
+            one of `observables`, such as "all/kinetic_energy"
 
         Returns
         -------
@@ -270,12 +275,12 @@ class State(Session):
         Parameters
         ----------
         most : int
-            largest number of events to return
+            largest number of events
 
         Returns
         -------
         list of tuple
-            time, i and j of each event; the numbers i and j are defined as in `EventLog`
+            time, i and j of each event, with i and j as in `EventLog`
 
         Raises
         ------
@@ -304,14 +309,12 @@ class State(Session):
         return records[:n]
 
     def event_log(self, most: int) -> EventLog:
-        """Return the latest events in chronological order.
-
-        The engine stores at least the latest million events.
+        """Return the latest events in chronological order, of which the engine stores a million.
 
         Parameters
         ----------
         most : int
-            largest number of events to return
+            largest number of events
 
         Returns
         -------
@@ -321,7 +324,7 @@ class State(Session):
         Raises
         ------
         RunError
-            if the input does not contain `output.event_log = .true.`
+            unless the input has `output.event_log = .true.`
 
         Examples
         --------
@@ -338,11 +341,9 @@ class State(Session):
 
 
 def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return a table of all obstacles or walls if one row of the input defines several of them.
+    """Return a table of obstacles or walls if a row of the input defines several, or nothing.
 
-    A row defines several obstacles or walls if the row contains the variable `file` or `points`.
-    In a row that defines several obstacles or walls, the coordinates are replaced by NaN.  If each
-    row defines only one obstacle or wall, the returned dictionary is empty.
+    Such a row contains the variable `file` or `points`; its coordinates in the table are NaN.
     """
     if not any({"file", "points"} & row.keys() for row in rows):
         return {}

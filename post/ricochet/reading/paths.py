@@ -1,11 +1,11 @@
-"""Exact paths of disks between frames, which follow from the collisions in the event log."""
+"""Exact paths of disks between frames, calculated from the collisions in the event log."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from ..reading.nature import KICKED
-from ..reading.reader import EventLog, Run
+from .nature import KICKED
+from .reader import SIDES, EventLog, Run
 
 
 class Turns(NamedTuple):
@@ -14,11 +14,11 @@ class Turns(NamedTuple):
     frame: np.ndarray  # (M,) index of the previous frame
     disk: np.ndarray  # (M,) indices
     time: np.ndarray  # (M,)
-    velocity: np.ndarray  # (M, 2) afterwards
+    velocity: np.ndarray  # (M, 2) afterwards; NaN if the disk has left the box
 
 
 def why_no_log_tells(run: Run) -> str:
-    """Return why no event log determines the paths of a run, or '' if a log determines them."""
+    """Return why no event log determines the paths of a run, or '' if one does."""
     if "recycled" in run.nature:
         return "recycled disks jump between frames"
     return "the driving bends the paths between" if run.nature & KICKED else ""
@@ -38,7 +38,7 @@ def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
     if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
     # The number of events before a frame follows from the event counts of all disks, even if
-    # several events occurred at the time of the frame.
+    # several events occurred at exactly this time.
     hits = run.event_count[frames].sum(axis=1, dtype=np.int64)
     return np.searchsorted(np.cumsum(1 + (log.j > 0)), hits, "right")
 
@@ -63,4 +63,9 @@ def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) 
     sums = np.cumsum(gain, axis=0)
     sums -= np.repeat(sums[first] - gain[first], np.diff(first, append=len(disk)), axis=0)
     fallen = (log.time[event] - run.time[frames][frame])[:, None] * run.gravity
-    return Turns(frame, disk, log.time[event], run.velocity[frames][frame, disk] + sums + fallen)
+    velocity = run.velocity[frames][frame, disk] + sums + fallen
+    if "open" in run.nature:
+        beyond_sides = -len(SIDES)  # largest id of an obstacle
+        departs = (log.j <= 0) & (log.j > beyond_sides) & (log.impulse == 0)
+        velocity[departs[event]] = np.nan
+    return Turns(frame, disk, log.time[event], velocity)

@@ -1,0 +1,317 @@
+"""Data of an interactive film of a run: disks in all frames, collisions, box, energies."""
+
+import base64
+from collections import defaultdict
+from contextlib import suppress
+
+import numpy as np
+from matplotlib.colors import to_hex
+
+from ..reading.box import groups_of_rows, passages
+from ..reading.files import RunError
+from ..reading.nature import known, rows_of
+from ..reading.paths import seen, turns_between, why_no_log_tells, why_unknown
+from ..reading.reader import SIDES, Run
+from ..reading.records import span
+from .drawing import COLOURS, label_of, scale_top
+
+SWING = ("amplitude", "period", "phase")  # variables of an oscillating side
+STROKE = ("velocity", "start_time", "end_time")
+JUMPING = {"recycled", "open"}  # traits of runs without displacements
+LAWS = ("motion", *SWING, *STROKE, "temperature", "surface_velocity")
+ROOM = 29e6  # largest size of the data of the disks [bytes of base64]
+TURN = (16 + 8) * 4 / 3  # bytes per velocity change between two frames, and per half of an event
+MOST_FRAMES = 20000
+MOST_RADII = 256  # largest number of different radii in a film
+FEW_DISKS = 20  # most disks to show all digits and next events
+MOST_SAMPLES = 2000  # largest number of samples of a plot
+ENERGIES = ("kinetic", "potential", "rotational")
+MOST_AT_ONCE = 200000  # number of disks, over all frames, that are read together
+
+
+def frames_that_fit(run: Run, room: float) -> int:
+    """Return the number of frames that fit into a file of the given size.
+
+    A disk needs 16 bits for each component of position and velocity, 8 for its collisions and 32
+    for its angle. Up to half of the file is for the event log.
+    """
+    more = sum(one is not None for one in (run.event_count, run.image, run.recycled))
+    more += 4 * ("orientation" in run.disk_data)
+    more += run.present is not None
+    one = run.n_disks * (8 + more) * 4 / 3
+    fixed = run.n_disks * (2 + 1 + 4 + 8) * 4 / 3  # for species, size, mass and first position
+    turns = 0 if run.event_count is None else TURN * float(run.event_count[-1].sum())
+    return int(np.clip((room - fixed - min(turns, room / 2)) / (one + 50), 2, MOST_FRAMES))
+
+
+def quantities(run: Run) -> list[str]:
+    """Return the quantities, other than the species, that colours of disks can show."""
+    found = ["speed"] if run.nature & JUMPING else ["speed", "displacement"]
+    return found + ["collisions"] * (run.event_count is not None)
+
+
+def in_room(run: Run, place: np.ndarray) -> np.ndarray:
+    """Return positions in units of the visible region, which contains the box at all times."""
+    lower, upper = run.bounds
+    return (place - lower) / (upper - lower)
+
+
+def sides(run: Run) -> list[dict]:
+    """Return the position, motion, temperature and surface velocity of each side of the box."""
+    places = [end[axis] for axis in (0, 1) for end in (run.lower, run.upper)]
+    found = [
+        {"place": float(side.get("position", at))}
+        | {k: side[k] for k in LAWS if side.get(k) not in (None, "still")}
+        | {k: bool(side[k]) for k in ("open",) if k in side}
+        for at, side in zip(places, run.sides, strict=True)
+    ]
+    for k, (time, place) in run.piston_positions.items():
+        some = thinned(len(time), MOST_FRAMES)
+        found[k]["way"] = [time[some].tolist(), np.ravel(place)[some].tolist()]
+    return found
+
+
+def opening_times(run: Run) -> list[float]:
+    """Return the times of the start and of all changes of the open sides."""
+    return [0.0, *(change.time for change in run.changes if change.name.endswith(".open"))]
+
+
+def thinned(count: int, most: int) -> np.ndarray:
+    """Return at most `most` evenly spread integers between 0 and `count` - 1."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
+
+
+def laws_of(run: Run, group: str) -> list[dict]:
+    """Return the temperature and surface velocity of each obstacle or wall."""
+    rows = rows_of(run.parameters.get(group, {}))
+    laws = [{k: float(row[k]) for k in LAWS[-2:] if known(row.get(k))} for row in rows]
+    return [laws[k] for k in groups_of_rows(run.parameters, group)]
+
+
+def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
+    """Return the arrays with the data of all disks in each frame.
+
+    Positions are 16-bit integers in units of the visible region, velocities in units of the largest
+    component of the frame; both have full precision for few disks. Numbers of collisions are bytes,
+    of which 255 is `top`. Periods crossed along x and y since the previous frame have four bits
+    each. Recycled disks are counted modulo 256, and disks in the box of an open system are marked
+    by 1.
+    """
+    found: dict[str, bytearray] = defaultdict(bytearray)
+    at_once = max(1, MOST_AT_ONCE // run.n_disks)
+    for first in range(0, len(frames), at_once):
+        some, before = frames[first : first + at_once], frames[max(0, first - 1)]
+        inside, velocity = in_room(run, run.position[some]), run.velocity[some]
+        if run.present is not None:
+            inside, velocity = np.nan_to_num(inside), np.nan_to_num(velocity)
+        fastest = np.ones(len(some))
+        if run.n_disks > FEW_DISKS:
+            inside = np.round(65535 * np.clip(inside, 0, 1)).astype("<u2")
+            fastest = np.abs(velocity).max(axis=(1, 2))
+            unit = np.where(fastest > 0, fastest, 1)[:, None, None]
+            velocity = np.round(32767 * velocity / unit).astype("<i2")
+        parts = {"positions": inside, "velocities": velocity, "fastest": fastest}
+        if run.event_count is not None:
+            share = np.log1p(run.event_count[some]) / np.log1p(top)
+            parts["hits"] = np.round(255 * np.clip(share, 0, 1)).astype("u1")
+        if run.image is not None:
+            crossed = np.clip(np.diff(run.image[[before, *some]], axis=0), -7, 7) + 8
+            parts["shifts"] = (16 * crossed[..., 0] + crossed[..., 1]).astype("u1")
+        if run.recycled is not None:
+            parts["recycled"] = (run.recycled[some] % 256).astype("u1")
+        if "orientation" in run.disk_data:
+            parts["angles"] = run.orientation[some].astype("<f4")
+        if run.present is not None:
+            parts["present"] = run.present[some].astype("u1")
+        for name, part in parts.items():
+            found[name] += part.tobytes()
+    return found
+
+
+def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
+    """Return collisions per disk in each frame and, unless the log is too long, events and paths.
+
+    An event has a time and two partners. For the paths, the number of velocity changes in each
+    interval between frames is stored, and for each change the disk, the fraction of the interval
+    and the new velocity.
+    """
+    exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
+    try:
+        log = run.event_log()
+    except RunError:  # a film can be made without an event log
+        facts["collisions"] = run.collisions_per_disk_at(run.time)[frames].tolist()
+        reason = why_no_log_tells(run) or "output.event_log tells the paths between"
+        return facts | {"note": reason}, {}
+    ends, pairs = seen(run, log, frames), np.append(0, np.cumsum(log.j > 0))
+    facts["collisions"] = (2 / run.n_disks * pairs[ends]).tolist()
+    some = slice(ends[0], ends[-1])
+    if ends[-1] - ends[0] + pairs[ends[-1]] - pairs[ends[0]] > most:
+        return facts | {"note": "too many collisions between"}, {}
+    facts |= {"events": exact, "note": why_unknown(run, log)}
+    blocks = {"when": log.time[some].astype("<f8")}
+    blocks |= {name: (own[some] - 1).astype("<i4") for name, own in (("i", log.i), ("j", log.j))}
+    if not facts["note"]:
+        facts["known"] = True
+        turns, time = turns_between(run, log, frames, ends), run.time[frames]
+        apart = np.append(np.diff(time), 1)[turns.frame]
+        share = (turns.time - time[turns.frame]) / np.where(apart > 0, apart, 1)
+        blocks["gaps"] = np.bincount(turns.frame, minlength=len(frames)).astype("<u4")
+        blocks["turning"] = turns.disk.astype("<u4")
+        numbers = np.column_stack([share, turns.velocity])
+        blocks["turns"] = numbers.astype("<f8" if exact else "<f4")
+    return facts, blocks
+
+
+def boundary_names(run: Run, kind: str) -> list[str]:
+    """Return the names of all obstacles or walls: 'wall floor', or 'wall 1' without a name."""
+    names = run.parameters.get(kind, {}).get("name", ())
+    return [
+        f"{kind} {names[k] if names[k] != f'{kind}{k + 1}' else k + 1}"
+        for k in groups_of_rows(run.parameters, kind)
+    ]
+
+
+def species(run: Run) -> list[dict]:
+    """Return for each species the properties that are common to all its disks."""
+    colours = [c if c != "#000000" else "#8a8a8a" for c in map(to_hex, COLOURS)]
+    return [
+        {
+            "name": kind.name,
+            "count": int(kind.disks.sum()),
+            "mass": kind.mass,
+            "alike": kind.alike,
+            "sizes": f"m = {span(kind.masses, 4)}, r = {span(kind.radii, 4)}",
+            "colour": colours[k % len(colours)],
+        }
+        for k, kind in enumerate(run.by_species)
+    ]
+
+
+def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Return at most 256 different radii, and the index of the radius of each disk."""
+    radii = np.unique(run.radius)
+    if len(radii) > MOST_RADII:
+        radii = np.geomspace(radii[0], radii[-1], MOST_RADII)
+    return radii, np.searchsorted((radii[1:] + radii[:-1]) / 2, run.radius)
+
+
+def curves(run: Run) -> dict:
+    """Return the energy of each species and the pressure against time, for small plots.
+
+    They are those of the observables, which are written more often than frames. Missing values are
+    None, as is the pressure before the first collision. For an open system, there are also the
+    numbers of disks inside, and of those that left and entered so far.
+    """
+    series, found = {}, {}
+    moved = passages(run.observables) if "open" in run.nature else {}
+    for name in (
+        "collisions",
+        "virial_pressure",
+        *(f"{s}/{e}_energy" for s in run.names for e in ENERGIES),
+        *(f"{s}/particle_number" for s in run.names if moved),
+        *(name for names in moved.values() for name in names),
+    ):
+        with suppress(RunError):
+            found["time"], series[name] = run.observable(name)
+    time = found.get("time", run.time[[0, -1]])
+    some = thinned(len(time), MOST_SAMPLES)
+
+    def rounded(name: str) -> list | None:
+        values = series.get(name, np.full(len(time), np.nan))
+        return [float(f"{x:.7g}") if np.isfinite(x) else None for x in values[some]]
+
+    if (pressure := series.get("virial_pressure")) is not None:
+        series["virial_pressure"] = np.where(series["collisions"] > 0, pressure, np.nan)
+    found = {"time": list(map(float, time[some])), "pressure": None}
+    if len(some) > 2 and np.isfinite(series.get("virial_pressure", np.nan)).any():
+        found["pressure"] = rounded("virial_pressure")
+    for kind in ENERGIES:
+        names = [f"{name}/{kind}_energy" for name in run.names]
+        there = kind == "kinetic" or any(
+            np.nan_to_num(series.get(name, time[:0])).any() for name in names
+        )
+        found[kind] = [rounded(name) for name in names] if there else None
+    if moved:
+        found["inside"] = [rounded(f"{name}/particle_number") for name in run.names]
+        for name, parts in moved.items():
+            series[name] = np.sum([series[part] for part in parts], axis=0) + 0 * time
+            found[name] = rounded(name)
+    return found
+
+
+def scene(run: Run) -> tuple[dict, dict]:
+    """Return the constant data of a film: the box, the obstacles, the species and the disks.
+
+    `run` is a `Run`, or another object with the same attributes.
+    """
+    radii, own = radii_of(run)
+    facts = {
+        "exact": run.n_disks <= FEW_DISKS,
+        "settles": run.nature.in_equilibrium,
+        "heated": bool(run.nature & {"thermal_walls", "thermostatted"}),
+        "recycling": "recycled" in run.nature,
+        "jumps": bool(run.nature & JUMPING),
+        "isOpen": "open" in run.nature,
+        "sources": [*run.parameters.get("source", {})],
+        "gravity": run.gravity.tolist(),
+        "lower": run.bounds[0].tolist(),
+        "edges": (run.bounds[1] - run.bounds[0]).tolist(),
+        "sides": sides(run),
+        "open": [[time, run.open_at(time).tolist()] for time in opening_times(run)],
+        "changes": [[time, f"{name} = {value or 'default'}"] for time, name, value in run.changes],
+        "periodic": run.periodic.tolist(),
+        "obstacles": [
+            [*map(float, o.centre), o.radius, o.inside, *([o.from_angle, o.to_angle] * o.is_arc)]
+            for o in run.obstacles
+        ],
+        "walls": run.walls.tolist(),
+        "laws": {name: laws_of(run, name) for name in ("obstacle", "wall")},
+        "species": species(run),
+        "radii": radii.tolist(),
+        "surfaces": [
+            *(f"the {side} side" for side in SIDES),  # names of partners j <= 0
+            *boundary_names(run, "obstacle"),
+            *boundary_names(run, "wall"),
+        ],
+    }
+    blocks = {
+        "mass": run.mass.astype("<f4"),
+        "species": (run.species - 1).astype("<u2"),
+        "sizes": own.astype("u1"),
+    }
+    return facts, {name: block.tobytes() for name, block in blocks.items()}
+
+
+def film(
+    run: Run,
+    frames: list[int],
+    colour: str,
+    traced: list[int],
+    room: float = ROOM,
+) -> tuple[dict, dict]:
+    """Return the values and the arrays of a film; each array is stored as bytes."""
+    tops = {name: scale_top(run, frames, name) for name in quantities(run)}
+    told, blocks = told_by_log(run, frames, room / 2 // TURN)
+    blocks = {name: block.tobytes() for name, block in blocks.items()}
+    blocks |= moving(run, frames, tops.get("collisions", 1))
+    # Displacements of disks are measured from the positions in the first frame of the film,
+    # unwrapped across periodic sides (`origin`).  Disks that jump have no displacements.
+    origin = run.position[frames[0]]
+    if not run.nature & JUMPING:
+        origin = run.unwrapped(0) + origin - run.unwrapped(frames[0])
+    blocks["origins"] = in_room(run, origin).astype("<f4").tobytes()
+    facts, own = scene(run)
+    facts |= {
+        "time": run.time[frames].tolist(),
+        "curves": curves(run),
+        "scales": {name: [label_of(run, name), float(f"{top:.7g}")] for name, top in tops.items()},
+        "colour": colour,
+        "traced": traced or ([0] if run.n_disks == 1 else []),
+        **told,
+    }
+    return facts, blocks | own
+
+
+def texts(facts: dict, blocks: dict) -> dict:
+    """Return the values and arrays of a film as text for a web page."""
+    return {"facts": facts, "blocks": {k: base64.b64encode(v).decode() for k, v in blocks.items()}}

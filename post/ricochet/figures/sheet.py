@@ -1,0 +1,248 @@
+"""Figures of named panels, drawn for a width on paper or for a slide."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.text import Text
+
+from ..reading.files import RunError, did_you_mean
+from .drawing import STYLE
+
+CM = 1 / 2.54  # [inches]
+WIDTH = 16.0  # of the text of an A4 page [cm]
+HIGHEST = 22.0  # figure for a page, which leaves room for a caption on A4 [cm]
+LONGEST = 25.0  # figure of stacked panels [cm]
+LEAST_HEIGHT = 3.5  # of a row of panels with its labels [cm]
+STACKED = 12.0  # panels of a narrower figure stand below each other [cm]
+SLIDE = 4 / 3  # size of text on a slide, divided by its size on paper
+SLIDE_SHAPE = 9 / 16  # height of a slide divided by its width
+SMALLEST = 8.0  # size of the smallest text [points]
+PAD = 6.0  # distance of a title from its panel [points]
+LINE = 1.35  # distance of lines of text divided by the size of the text
+LETTER = 0.52  # mean width of a letter divided by the size of the text
+HANDLE = 5  # width of the line or symbol of a legend [letters]
+TOO_LONG = "The figure is higher than a page: --panel NAME draws one panel alone."
+LETTERS = 6.4  # mean number of letters of the smallest text [1/cm]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Panel of a figure, which `draw(axes, *arguments)` draws.
+
+    `aspect` is the ratio of height to width, `weight` the relative width in a row, and `share_x`
+    and `share_y` name panels of the figure with the same axis.
+    """
+
+    name: str
+    draw: Callable[..., None]
+    arguments: tuple[Any, ...] = ()
+    aspect: float = 0.75
+    weight: float = 1.0
+    share_x: str = ""
+    share_y: str = ""
+
+
+@dataclass
+class Sheet:
+    """Panels in rows, the title above the panels, and a function that adds a common legend."""
+
+    rows: list[list[Panel]]
+    title: str = ""
+    legend: Callable[[Figure], None] | None = None
+    notes: list[str] = field(default_factory=list)  # explanations below the figure
+
+    def only(self, name: str) -> "Sheet":
+        """Return a figure of one panel."""
+        panels = {panel.name: panel for row in self.rows for panel in row}
+        if name not in panels:
+            hint = did_you_mean(name, panels) or f"; there are {', '.join(panels)}"
+            raise RunError(f"the figure has no panel {name}{hint}")
+        return Sheet([[panels[name]]], self.title, self.legend, self.notes)
+
+    def figure(
+        self,
+        panel: str | None = None,
+        width: float | str | None = None,
+        warnings: Sequence[str] = (),
+    ) -> Figure:
+        """Draw the figure, or one panel of it, for a width (see `width_of`)."""
+        size, slide = width_of(width)
+        sheet = self.only(panel) if panel else self
+        rows = sheet.rows
+        if size < STACKED:
+            rows = [[one] for row in rows for one in row]
+        with plt.style.context([STYLE, sizes_of_text(SLIDE if slide else 1.0)]):
+            return sheet.drawn(rows, size, SLIDE_SHAPE if slide and panel else None, warnings)
+
+    def drawn(
+        self, rows: list[list[Panel]], width: float, shape: float | None, warnings: Sequence[str]
+    ) -> Figure:
+        """Draw rows of panels, the title, and notes and warnings below the panels."""
+        letters = int(width * LETTERS * SMALLEST / plt.rcParams["legend.fontsize"])
+        title = [line for part in self.title.split("\n") for line in wrap(part, letters - 4)]
+        below = [(line, "0.25") for note in self.notes for line in wrap(note, letters)]
+        below += [(line, "firebrick") for line in warning_lines(warnings, letters)]
+        small = plt.rcParams["legend.fontsize"]
+        line = small / 72 * LINE  # [inches]
+        figure = plt.figure(figsize=(width * CM, width * CM))
+        foot = line * (len(below) + 0.5 * bool(below))
+        highest = CM * (LONGEST if width < STACKED else HIGHEST * max(1.0, width / WIDTH))
+        heights = self.draw_panels(figure, rows, highest - line * len(title) - foot)
+        whole = sum(heights) + line * len(title) + foot
+        if whole > highest + 1e-6 and shape is None and sum(map(len, rows)) > 1:
+            longer = wrap(TOO_LONG, letters)
+            below += [(text, "0.25") for text in longer]
+            foot += line * len(longer)
+            whole += line * len(longer)
+        whole = whole if shape is None else max(width * CM * shape, foot + line * 12)
+        figure.set_size_inches(width * CM, whole)
+        above = (0, foot / whole, 1, 1 - foot / whole)  # the notes
+        layout = ConstrainedLayoutEngine(rect=above)
+        figure.set_layout_engine(layout)
+        for axes in figure.axes:
+            wrap_labels(figure, axes)
+        if title:
+            figure.suptitle("\n".join(title), fontsize=small)
+        if self.legend:
+            self.legend(figure)
+        for legend in figure.legends:
+            legend.set_bbox_to_anchor(above, figure.transFigure)
+        for k, (text, colour) in enumerate(reversed(below)):
+            figure.text(0.01, (k + 0.4) * line / whole, text, color=colour, fontsize=small)
+        if any(axes.get_aspect() != "auto" for axes in figure.axes):
+            # The shape of a panel with equal scales is known only after a layout, and titles would
+            # overlap without a second one, which takes place when the figure is drawn.
+            layout.execute(figure)
+        return figure
+
+    def draw_panels(self, figure: Figure, rows: list[list[Panel]], room: float) -> list[float]:
+        """Draw rows of panels, and return the heights in inches; legends need space.
+
+        The highest rows are lower than their panels require if all would not fit in `room`.
+        """
+        alone = all(len(row) == 1 for row in rows)  # one grid aligns the axes of all rows
+        parts = figure.add_gridspec(len(rows), 1)
+        drawn: dict[str, Axes] = {}
+        for k, row in enumerate(rows):
+            weights = [one.weight for one in row]
+            cells = [parts[k]] if alone else parts[k].subgridspec(1, len(row), width_ratios=weights)
+            for j, one in enumerate(row):
+                shared = {"sharex": drawn.get(one.share_x), "sharey": drawn.get(one.share_y)}
+                drawn[one.name] = figure.add_subplot(cells[j], **shared)
+        legends = []
+        for row in rows:
+            for one in row:
+                one.draw(drawn[one.name], *one.arguments)
+            legends.append(max(height_of_legend(drawn[one.name]) for one in row))
+        panels = [height_of(row, figure.get_figwidth()) for row in rows]
+        top = largest_height(panels, room - sum(legends))
+        heights = [min(panel, top) + own for panel, own in zip(panels, legends, strict=True)]
+        parts.set_height_ratios(heights)
+        return heights
+
+
+def legend_above(axes: Axes, **style: Any) -> None:
+    """Add a legend between a panel and its title, where it hides no data."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure, size = axes.get_figure(root=True), float(plt.rcParams["legend.fontsize"])
+    inches = axes.get_position().width * (figure.get_figwidth() if figure else 1.0)
+    letters = inches * 72 / (LETTER * size)
+    labels = ["\n".join(wrap(label, letters - HANDLE)) for label in labels]
+    lines = [label.split("\n") for label in labels]
+    widest = max((letters_of(line) for label in lines for line in label), default=0) + HANDLE
+    columns = max(1, min(len(labels), int(letters / widest)))
+    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.3}
+    close = {"labelspacing": 0.25, "borderpad": 0.2, "handlelength": 1.6, "columnspacing": 1.2}
+    axes.legend(handles, labels, ncols=columns, **place | close | style)
+    columns_of_lines = np.array_split([len(label) for label in lines], columns)
+    height = max(sum(column) for column in columns_of_lines) + ("title" in style)
+    for where in ("left", "center"):
+        axes.set_title(axes.get_title(loc=where), loc=where, pad=PAD + size * LINE * height)
+
+
+def height_of_legend(axes: Axes) -> float:
+    """Return the height in inches of a legend between a panel and its title."""
+    offset = axes.titleOffsetTrans.get_matrix()[1, 2]  # type: ignore[attr-defined]
+    figure = axes.get_figure(root=True)
+    return max(0.0, float(offset) / (figure.dpi if figure else 72) - PAD / 72)
+
+
+def wrap(text: str, letters: float) -> list[str]:
+    """Divide a text into lines of about the given number of letters, and no formula."""
+    lines: list[str] = []
+    for word in re.findall(r"\([^()]*\)\S*|(?:\$[^$]*\$|[^\s$])+", text):
+        if lines and letters_of(f"{lines[-1]} {word}") <= letters:
+            lines[-1] += f" {word}"
+        else:
+            lines.append(word)
+    return lines
+
+
+def letters_of(text: str) -> float:
+    """Return the approximate width of a text, which may contain formulas, in letters."""
+    return len(re.sub(r"[${}_^]", "", re.sub(r"\\(?:[a-zA-Z]+|,)", "x", text)))
+
+
+def wrap_labels(figure: Figure, axes: Axes) -> None:
+    """Write a label of an axis that is longer than the axis in several lines."""
+    size = figure.get_size_inches() * axes.get_position().size * 72  # [points]
+    for axis, length in zip((axes.xaxis, axes.yaxis), size, strict=True):
+        label = axis.get_label()
+        letters = length / (LETTER * float(label.get_fontsize()))
+        label.set_text("\n".join(wrap(label.get_text(), max(10, letters))))
+
+
+def height_of(row: Sequence[Panel], width: float) -> float:
+    """Return the height of a row of panels with a total width."""
+    whole = sum(panel.weight for panel in row)
+    return max(panel.aspect * width * panel.weight / whole for panel in row)
+
+
+def largest_height(heights: Sequence[float], room: float) -> float:
+    """Return the largest height of a row for which all rows fit in `room` [inches]."""
+    for k, height in enumerate(order := sorted(heights)):
+        equal = (room - sum(order[:k])) / (len(order) - k)
+        if height >= equal:
+            return max(equal, LEAST_HEIGHT * CM)
+    return max(heights)
+
+
+def width_of(text: float | str | None) -> tuple[float, bool]:
+    """Convert a width, such as 8.5, '8.5cm' or 'slide', to cm, and return whether it is a slide."""
+    if text is None or text == "slide":
+        return WIDTH, text == "slide"
+    try:
+        width = float(str(text).removesuffix("cm"))
+    except ValueError:
+        width = 0.0
+    if not 5 <= width <= 100:
+        raise RunError(f"'{text}' is not a width from 5cm to 100cm, or slide")
+    return width, False
+
+
+def sizes_of_text(scale: float) -> dict[str, Any]:
+    """Return the sizes of text in a figure: 9 points on paper, 8 points in legends and at ticks."""
+    names = "font.size", "axes.labelsize", "axes.titlesize", "figure.titlesize"
+    small = "legend.fontsize", "legend.title_fontsize", "xtick.labelsize", "ytick.labelsize"
+    return dict.fromkeys(names, 9 * scale) | dict.fromkeys(small, SMALLEST * scale)
+
+
+def warning_lines(warnings: Sequence[str], letters: int) -> list[str]:
+    """Return the lines of at most three warnings, and of the number of further warnings."""
+    lines = [line for text in warnings[:3] for line in wrap(f"Warning: {text}", letters)]
+    rest = len(warnings) - 3
+    return lines + [f"and {rest} more warning{'s' * (rest > 1)}, as printed"] * (rest > 0)
+
+
+def smallest_text(figure: Figure) -> float:
+    """Return the size in points of the smallest visible text of a figure."""
+    figure.draw_without_rendering()
+    texts = [one for one in figure.findobj() if isinstance(one, Text) and one.get_visible()]
+    return min(float(text.get_fontsize()) for text in texts if text.get_text())

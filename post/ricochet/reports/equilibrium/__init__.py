@@ -1,0 +1,1 @@
+"""Gases in equilibrium and in steady states."""

@@ -1,0 +1,291 @@
+"""Quantities of driven disks against time, with pictures of the disks."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ...analysis import driven
+from ...analysis.driven import Curves, Room, TimeSeries
+from ...analysis.estimates import Estimate
+from ...analysis.statistics import SeriesMean, combine_runs, correlated_mean, has_trend, windows
+from ...figures import drawing
+from ...figures.drawing import COLOURS, plt
+from ...figures.sheet import Panel, Sheet, legend_above
+from ...reading.reader import Run, RunError
+from ..groups import Group
+from ..options import Option
+from ..registry import Analysis
+from ..result import Result
+from ..tables import measured, over_runs, with_all_columns
+
+MOST_PICTURES = 3
+POINTS, FINE = 60, 1000  # points of a curve, and of a curve whose fluctuations are of interest
+SMALLEST = 2.2  # smallest diameter of a drawn disk [points]
+LINES = ("-", "-.", ":")  # line styles of the inputs, if colours denote species
+Law = np.ndarray | float | Room | None
+
+
+def no_law(run: Run) -> None:
+    """Return no prediction."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Quantity of the figure.
+
+    The mean of `compared(values)` is compared with the prediction `law`.
+    """
+
+    label: str
+    unit: str
+    curves: Callable[[Run], Curves]
+    law: Callable[[Run], Law] = no_law
+    compared: Callable[[np.ndarray], np.ndarray] = np.asarray
+    points: int = POINTS
+
+
+QUANTITIES = {
+    "width": Quantity("width of the box", "length", driven.width, driven.width_law, points=FINE),
+    "temperature": Quantity("kT", "energy", driven.temperature, driven.temperature_law),
+    "share": Quantity(
+        "share of the disks in the left half",
+        "number",
+        driven.share,
+        driven.demon_law,
+        driven.fuller,
+    ),
+    "height": Quantity("mean height", "length", driven.height),
+    "viscosity": Quantity("$-P_{xy}$ / shear rate", "viscosity", driven.viscosity),
+    "cluster": Quantity("share of the disks in the largest cluster", "number", driven.cluster),
+}
+
+
+@dataclass
+class Found:
+    """Curves of a group by species, in the order of the runs, and their prediction."""
+
+    tracks: dict[str, list[TimeSeries]]
+    law: Law
+
+
+def check(run: Run) -> None:
+    """Raise an error for a run with one frame."""
+    if run.n_frames < 2 or not run.time[-1] > run.time[0]:
+        raise RunError(f"{run.path}: has one frame, two are required")
+
+
+def by_input(runs: list[Run]) -> list[tuple[str, list[Run]]]:
+    """Group runs that differ only by their seed; the keys describe how the groups differ."""
+    own = [{"N": run.n_disks, "ξ": run.restitution, **drawing.numbers_of(run)} for run in runs]
+    names = [name for name in own[0] if len({numbers.get(name) for numbers in own}) > 1]
+    groups: dict[str, list[Run]] = {}
+    for run, numbers in zip(runs, own, strict=True):
+        label = ", ".join(
+            drawing.stated(name, {numbers[name]}) for name in names if name in numbers
+        )
+        groups.setdefault(label, []).append(run)
+    return list(groups.items())
+
+
+def on_average(laws: list[Law]) -> Law:
+    """Return the mean prediction of runs that differ in their seed and their initial energy."""
+    rooms = all(isinstance(law, Room) for law in laws)
+    return Room(*map(float, np.mean(laws, axis=0))) if rooms else laws[0]
+
+
+def found_in(runs: list[Run], quantity: Quantity) -> Found:
+    """Return the curves of runs, and the prediction."""
+    tracks: dict[str, list[TimeSeries]] = {}
+    for run in runs:
+        for species, curve in quantity.curves(run).items():
+            tracks.setdefault(species, []).append(curve)
+    return Found(tracks, on_average([quantity.law(run) for run in runs]))
+
+
+# --- table ---
+
+
+def late(curve: TimeSeries, compared: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return the values in the second half of a curve that are compared with the prediction."""
+    time, value = curve
+    return compared(value[time >= (time[0] + time[-1]) / 2])
+
+
+def members_of(group: Group, species: str, show: str, halves: list[np.ndarray]) -> list[SeriesMean]:
+    """Return the mean over the second half of each run.
+
+    It has no error if the energy of the run is constant: its fluctuations do not show the scatter
+    over seeds.
+    """
+    members = [correlated_mean(half) for half in halves]
+    if show != "temperature" or species:
+        return members
+    pairs = zip(members, group.runs, strict=True)
+    return [m._replace(error=np.nan) if driven.keeps_energy(run) else m for m, run in pairs]
+
+
+def components(runs: list[Run]) -> dict[str, float | None]:
+    """Return the table cells of kT_x and kT_y, if the runs contain them."""
+    if not all("kinetic_tensor" in run.observables for run in runs):
+        return {}
+    parts, row = [driven.components(run) for run in runs], {}
+    for name in parts[0]:
+        halves = [late(one[name], np.asarray) for one in parts]
+        row |= measured(name, combine_runs(list(map(correlated_mean, halves))))
+    return row
+
+
+def deviations(
+    runs: list[Run], law: Room, mean: float, halves: list[np.ndarray]
+) -> dict[str, float | None]:
+    """Return the table cells of the fluctuations of the width, and of conserved quantities."""
+    squares = combine_runs([correlated_mean((half - mean) ** 2) for half in halves])
+    found = Estimate(squares.mean**0.5, squares.error / 2 / squares.mean**0.5)
+    row = measured("deviation", found) | {"theory_deviation": law.deviation}
+    changes = np.max([driven.balances(run) for run in runs], axis=0)
+    return row | dict(zip(("enthalpy_change", "momentum_change"), changes, strict=True))
+
+
+def row_of(
+    group: Group, species: str, show: str, compared: Callable, warnings: list[str]
+) -> dict[str, Any]:
+    """Return the table row of all disks or a species, and add to `warnings`."""
+    curves = group.values.tracks[species]
+    halves = [late(curve, compared) for curve in curves]
+    about = ", ".join(filter(None, (show, group.key, species)))
+    row = {"input": group.key or None, "species": species or None, "runs": len(curves)}
+    row |= over_runs("late", members_of(group, species, show, halves), warnings, about)
+    if any(map(has_trend, halves)):
+        warnings.append(f"{about}: still increases or decreases; 'late' is not steady")
+    law = None if species else group.values.law
+    mean, error = row["late"], row["late_error"]
+    if show == "temperature" and not species:
+        row |= components(group.runs)
+    if isinstance(law, Room):
+        row |= deviations(group.runs, law, mean, halves)
+        law = law.mean
+    if np.ndim(law):
+        law = float(np.mean(late((curves[0][0], law), np.asarray)))
+    ratio = law and Estimate(mean / law, error / law)
+    return row | {"theory": law} | measured("ratio", ratio)
+
+
+# --- figure ---
+
+
+def levels(law: Law, compared: Callable) -> list:
+    """Return the values of a prediction that the figure shows as horizontal lines."""
+    if isinstance(law, Room):
+        return [law.mean, law.mean - law.deviation, law.mean + law.deviation]
+    return [] if law is None else [law, 1 - law] if compared is driven.fuller else [law]
+
+
+def styles_of(result: Result) -> dict[tuple[str, str], dict[str, Any]]:
+    """Return colour and line style of each curve.
+
+    A colour denotes an input or a species, also in the pictures of disks.
+    """
+    kinds = any(species for group in result.groups for species in group.values.tracks)
+    styles = {}
+    for k, group in enumerate(result.groups):
+        for species in group.values.tracks:
+            names = group.runs[0].names
+            colour = COLOURS[names.index(species) % len(COLOURS)] if species else "black"
+            style = {"color": colour, "ls": LINES[k % len(LINES)]}
+            styles[group.key, species] = style if kinds else {"color": group_colour(result, k)}
+    return styles
+
+
+def group_colour(result: Result, k: int) -> str:
+    """Return a colour of a group that no species has in the pictures."""
+    names = result.runs[0].names
+    first = len(names) if len(names) > 1 else 0
+    return drawing.colours(len(result.groups), first)[k]
+
+
+def draw_curves(axes: plt.Axes, result: Result) -> None:
+    """Draw measured values as solid lines and predictions as dashed lines."""
+    quantity, styles = QUANTITIES[result.options.show], styles_of(result)
+    fine = quantity.points == FINE
+    for group in result.groups:
+        for species, curves in group.values.tracks.items():
+            style = styles[group.key, species]
+            label = ", ".join(filter(None, (group.key, species))) or "measured"
+            for k, (time, value) in enumerate(curves):
+                means = windows(time, value, (time[-1] - time[0]) / quantity.points)
+                more = {"label": label * (k == 0)} | drawing.lone(means[0])
+                axes.plot(*means, lw=1, alpha=0.4 if fine else 1, **style, **more)
+        species, curves = next(iter(group.values.tracks.items()))
+        colour = styles[group.key, species]["color"] if len(result.groups) > 1 else "black"
+        for level in levels(group.values.law, quantity.compared):
+            over = curves[0][0] if np.ndim(level) else np.array([0, curves[0][0][-1]])
+            axes.plot(over, np.broadcast_to(level, over.shape), color=colour, ls="--", lw=1.6)
+    if any(levels(group.values.law, quantity.compared) for group in result.groups):
+        label = "theory: mean and standard deviation" if fine else "theory"
+        axes.plot([], [], color="black", ls="--", label=label)
+    bottom, top = 0.9 * axes.dataLim.y0 if fine else 0, 1.06 * axes.dataLim.y1
+    units = result.runs[0].units
+    axes.set(xlim=(0, None), ylim=(bottom, top), xlabel=units.label("time"))
+    axes.set_ylabel(units.label(quantity.label, quantity.unit))
+    legend_above(axes)
+
+
+def draw_picture(axes: plt.Axes, run: Run, frame: int, name: str, colour: str) -> None:
+    """Draw the disks of a frame; very small disks are enlarged."""
+    drawing.draw_box(axes, run, run.time[frame])
+    several = len(run.names) > 1
+    shades = drawing.species_colours(run) if several else [colour] * run.n_disks
+    across = drawing.points_per_length(axes) * 2 * run.radius.mean()
+    rim = {"linewidths": max(0.0, SMALLEST - across), "edgecolors": "face"}
+    drawing.disk_collection(axes, run, run.position[frame], facecolors=shades, **rim)
+    axes.set_title("\n".join(filter(None, (name, f"t = {run.time[frame]:.4g}"))))
+
+
+def draw(result: Result) -> Sheet:
+    """Draw the curves of a quantity, and below the curves the pictures of the disks."""
+    groups, first = result.groups, result.runs[0]
+    pictures = [(group.runs[0], -1, group.key, k) for k, group in enumerate(groups)]
+    if len(groups) == 1:
+        pictures = [(first, frame, "", 0) for frame in (0, -1)]
+    shown = pictures[:MOST_PICTURES]
+    aspect = min(2.5, drawing.aspect_of(first))
+    panels = [
+        Panel(f"picture{k + 1}", draw_picture, (*one, group_colour(result, number)), aspect)
+        for k, (*one, number) in enumerate(shown)
+    ]
+    species = any(one for group in groups for one in group.values.tracks)
+
+    def legend(figure: plt.Figure) -> None:
+        if not species:  # otherwise the legend of the curves shows their colours
+            drawing.species_legend(figure, first)
+
+    curves = Panel("curves", draw_curves, (result,), aspect=0.45)
+    return Sheet([[curves], panels], drawing.titled(result.runs), legend)
+
+
+def compute(groups: list[Group], options: SimpleNamespace) -> Result:
+    """Compare the quantity in the second half of the runs with its prediction."""
+    quantity, warnings = QUANTITIES[options.show], []
+    for group in groups:
+        group.values = found_in(group.runs, quantity)
+    rows = [
+        row_of(group, species, options.show, quantity.compared, warnings)
+        for group in groups
+        for species in group.values.tracks
+    ]
+    notes = [f"A line for each run, through means over 1/{quantity.points} of it."]
+    return Result(with_all_columns(rows), notes=notes, warnings=warnings)
+
+
+ANALYSIS = Analysis(
+    compute,
+    draw,
+    options=(
+        Option("show", "quantity to show [temperature]", "temperature", choices=[*QUANTITIES]),
+    ),
+    accepts=check,
+    group_by=by_input,
+)

@@ -1,0 +1,1 @@
+"""Granular matter: cooling, craters and flows."""

@@ -1,0 +1,1 @@
+"""The program itself: computing times and error bars."""
