@@ -2,11 +2,10 @@
 
 # Benchmarks: cost of collisions, of the start of a run and of the output. docs/explanation/performance.md explains the results.
 #
-# A rate is the number of collisions, in millions, per second of processor time. A rate is measured in runs on one core that also
-# sample observables, and the printed rate is the median of RUNS=5 runs. Before the measurement, the system is simulated until the
-# state no longer depends on the initial state. No other program should run during the measurements. The environment variable
-# RICOCHET names the measured program (default build/ricochet). The option --check requires a program that was compiled without
-# AVX-512 code, because valgrind cannot execute such code.
+# A rate is the number of collisions, in millions, per second of processor time, measured on one core in runs that also sample
+# observables; the printed rate is the median of RUNS=5 runs. Before each measurement, the system is simulated until it has lost the
+# memory of its initial state. No other program should run meanwhile. The environment variable RICOCHET names the measured program
+# (default build/ricochet). --check requires a program compiled without AVX-512 instructions, which valgrind cannot execute.
 #
 # Examples of calls:
 #
@@ -34,10 +33,9 @@ input() {
   for species; do echo "&species $species, $start /"; done >"$file"
 }
 
-# state NAME SPECIES...: simulates disks of the species SPECIES for 20 collisions per disk, and writes the input file
-# $work/NAME.nml, which starts from the last frame of this simulation. The initial positions are random or, if the packing fraction
-# is too high for random insertion, on a lattice. A lattice of 1e5 disks or more does not melt during a simulation of 20 collisions
-# per disk.
+# state NAME SPECIES...: simulates the disks SPECIES for 20 collisions per disk, and writes the input file $work/NAME.nml, which
+# starts from the last frame. Initial positions are random or, at packing fractions too high for random insertion, on a lattice,
+# which does not melt within these 20 collisions per disk if it has 1e5 disks or more.
 state() {
   local name=$1 placement=random
   shift
@@ -49,11 +47,10 @@ state() {
   input "$work/$name.nml" "placement = 'file', file = '$work/$name.h5', velocities = 'file'" "$@"
 }
 
-# gas DISKS PACKING: prepares a starting state of equal disks with the packing fraction PACKING.
+# gas DISKS PACKING: prepares an initial state of equal disks at the packing fraction PACKING.
 gas() { state "gas_$1_$2" "name = 'gas', count = $1, packing_fraction = $2"; }
 
-# polydisperse DISTRIBUTION DISKS PACKING: prepares a starting state of disks with different radii; the largest radius is up to 9.9
-# times the smallest radius.
+# polydisperse DISTRIBUTION DISKS PACKING: prepares an initial state of polydisperse disks with a size ratio of up to 9.9.
 polydisperse() {
   local spread=0.472
   [ "$1" = lognormal ] && spread=0.398

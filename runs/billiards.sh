@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 
-# Exercise L3, circular walls and unequal disks: paths in the billiards of Sinai and Lorentz, divergence of initially close paths, a
+# Lab, task 4: circular walls and unequal disks: paths in the Sinai and Lorentz billiards, divergence of initially close paths, a
 # round container, and Brownian motion.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
@@ -8,8 +8,7 @@ for name in sinai lorentz container; do
   runs/ensemble.sh "input/$name.nml" -d "$data/$name" --seeds 1 --set output.event_log=.true. "$@"
 done
 
-# Sinai's billiard is simulated from 64 initial states. For each initial state there are two runs, whose initial positions differ by
-# 1e-12.
+# Sinai billiard: 64 initial states, each in two runs whose initial positions differ by 1e-12.
 mkdir -p "$data/sinai_pairs"
 for k in {1..64}; do
   for shift in 0 1e-12; do

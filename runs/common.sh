@@ -1,8 +1,8 @@
 # shellcheck shell=bash
 
-# Definitions that are common to all scripts in this folder that simulate a system; each of these scripts sources this file. The
-# file defines the variables `python` (the Python interpreter), `data` (folder of the output files) and `figures` (folder of the
-# figures), and the function `replace`. Options such as -j 4 are passed to ensemble.sh.
+# Definitions shared by all scripts of this folder that simulate a system and source this file: the variables `python` (Python
+# interpreter), `data` (folder of output files) and `figures` (folder of figures), and the function `replace`. Options such as -j 4
+# are passed on to ensemble.sh.
 set -euo pipefail
 if [[ " $* " == *' -h '* || " $* " == *' --help '* ]]; then
   sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"
@@ -18,8 +18,7 @@ command -v "$python" >/dev/null || {
 }
 mkdir -p -- "$data" "$figures"
 
-# replace FILE: writes standard input to FILE. If FILE is a symbolic link, the link is replaced by a file, and the target of the
-# link is not changed.
+# replace FILE: writes standard input to FILE. A symbolic link is replaced by a file; its target does not change.
 replace() {
   rm -f -- "$1" && (set -C && cat >"$1")
 }

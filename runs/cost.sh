@@ -1,14 +1,13 @@
 #!/usr/bin/env bash
 
-# Exercise L2: time per collision against the number of disks, for the three methods of finding the next event. Only one run is
-# performed at a time, because simultaneous runs would affect the measured times. To repeat the measurement, remove the folder
+# Lab, task 3: time per collision as a function of the number of disks, for the three methods of finding the next event. The runs
+# are performed one by one, because simultaneous runs would affect each other's times. To repeat the measurement, remove the folder
 # runs/cost.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# The packing fraction is always 0.3, and no output is written during a run. The runs have 10 collisions per disk, or 5 collisions
-# per disk for a million disks. With at least 5 collisions per disk, the cost of the initial prediction of one event per disk is
-# negligible. The method `rescan` predicts the events of all disks after each collision; therefore runs with this method need only a
-# few hundred collisions in total.
+# The packing fraction is 0.3, and no output is written during a run. Runs have 10 collisions per disk (5 for a million disks),
+# enough to make the cost of the first predictions negligible. `rescan` predicts the events of all disks after each collision; a few
+# hundred collisions in total are enough for it.
 measure() { # columns: collisions, collisions per disk, power of N by which the collisions are divided, search, numbers of disks
   local collisions=$1 per_disk=$2 power=$3 search=$4 count number radius
   shift 4

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 
-# Fraction of error bars that contain the true value, determined from 200 short runs of a gas, of a liquid, and of a liquid near
-# freezing.
+# Coverage of the error bars: the fraction that contains the true value, from 200 short runs each of a gas, of a liquid, and of a
+# liquid near freezing.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 while read -r packing placement; do

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 
-# Exercise S5: pictures of one crater, and crater size against mass, speed and radius of the projectile and against restitution.
+# Exam, problem 5: pictures of one crater, and crater size as a function of mass, speed and radius of the projectile and of the
+# restitution.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Each parameter is varied over ten values, with eight beds (seeds) for each value. While one parameter varies, the other three
-# parameters keep their standard values: mass 25, speed 5, radius 5 and restitution 0.5. The crater does not depend on the speed,
-# because hard disks define no energy scale. A constant contact time in the TC model would define an energy scale; therefore the
-# contact time is proportional to 1/speed.
+# Each parameter is varied over ten values, with eight beds (seeds) for each value, while the other three keep their standard
+# values: mass 25, speed 5, radius 5 and restitution 0.5. Hard disks have no energy scale, so the crater does not depend on the
+# speed. A constant contact time (TC model) would introduce such a scale; it is therefore proportional to 1/speed.
 member() { # mass speed radius restitution seed
   local contact_time
   contact_time=$(awk -v v="$2" 'BEGIN { printf "%.17g", 5e-5 / v }')

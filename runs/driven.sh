@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 
-# Simulations of gases that walls heat or shear, of rough disks, of transport coefficients in equilibrium, and of driven disks. The
-# driven systems are the Leidenfrost effect, Maxwell's demon, the Brazil nut effect, compression by a piston, white-noise driving
-# and active disks. Each system is simulated with four seeds.
+# Gases heated or sheared by walls, rough disks, transport coefficients in equilibrium, and driven disks: Leidenfrost effect,
+# Maxwell's demon, Brazil nut effect, compression by a piston, white-noise driving and active disks. Four seeds each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 for system in fourier couette rough; do
@@ -14,8 +13,7 @@ done
   -o "$figures/couette.png" --csv "$figures/couette.csv"
 "$python" post/rough.py "$data"/rough/*.h5 -o "$figures/rough.png" --csv "$figures/rough.csv"
 
-# In the runs for viscosity, conductivity and diffusion, the interval between frames is several mean free times at each packing
-# fraction.
+# For viscosity, conductivity and diffusion, frames are several mean free times apart at each packing fraction.
 transport=()
 while read -r packing interval samples placement; do
   runs/ensemble.sh input/bulk.nml -d "$data/transport_$packing" --seeds 1-4 \
@@ -34,8 +32,8 @@ TABLE
 "$python" post/transport.py "${transport[@]}" -o "$figures/transport.png" \
   --csv "$figures/transport.csv"
 
-# The arguments of the function are the system, the quantity that the figure shows, the name of the run for the film, and options of
-# ensemble.sh that define the runs.
+# Arguments: the system, the quantity on the vertical axis, the name of the run for the film, and options of ensemble.sh that define
+# the runs.
 while read -r system show film scan; do
   runs/ensemble.sh "input/$system.nml" -d "$data/$system" --seeds 1-4 ${scan:+--scan "$scan"} "$@"
   "$python" post/driven.py "$data/$system"/*.h5 --show "$show" -o "$figures/$system.png" \

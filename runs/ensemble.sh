@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 
-# Performs the runs of a sweep, one run for each combination of seeds and values of variables, on all cores. After an interruption,
-# the same command continues the sweep.
+# Performs the member runs of a sweep on all cores: one for each combination of seeds and values of variables. After an
+# interruption, the same command continues the sweep.
 set -euo pipefail
 me=${0##*/}
 ((BASH_VERSINFO[0]*100 + BASH_VERSINFO[1] >= 404)) || { echo "bash 4.4 or newer is needed, this is $BASH_VERSION" >&2; exit 2; }
@@ -50,7 +50,7 @@ exit:   0 all members finished; 1 some members failed; 2 wrong usage; 3 the fold
 TEXT
 }
 
-# fail CODE TEXT...: prints an error message in one line, and exits with the exit status CODE.
+# fail CODE TEXT...: prints a one-line error message and exits with the status CODE.
 fail() {
   local code=$1
   shift
@@ -564,7 +564,7 @@ if [[ -n $dry ]]; then
   reason=$("$program" "${arguments[@]}" 2>&1 </dev/null) || status=$?
   ((status != 2)) || die "member ${names[0]} cannot run: ${reason##*$'\n'}"
   ((status == 0)) || printf '%s: note: member %s cannot run yet: %s\n' "$me" "${names[0]}" "${reason##*$'\n'}" >&2
-  exit 0 # a starting file may be a result of another sweep that does not exist yet
+  exit 0 # an initial-configuration file may be a result of another sweep that does not exist yet
 fi
 command -v flock >/dev/null || die "the program flock is missing (package util-linux)"
 reason=$(mkdir -p -- "$folder" 2>&1) || fail 3 "cannot make $folder: ${reason##*: }"

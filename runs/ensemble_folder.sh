@@ -1,12 +1,11 @@
 # shellcheck shell=bash
 # shellcheck disable=SC2154,SC2034 # ensemble.sh assigns `folder` and other variables, and reads variables that this file assigns
 
-# This file contains the functions with which ensemble.sh reads and writes the files of a sweep. The functions in this file
-# determine from the files in `folder` which member runs are finished, have failed or can continue, and store the settings of the
-# member runs. The functions never write through links, into FIFOs, or into files that ensemble.sh did not create. Errors are
-# reported by the functions `fail` and `die` of ensemble.sh.
+# Functions with which ensemble.sh reads and writes the files of a sweep. From the files in `folder` they determine which member
+# runs are finished, have failed or can continue, and they store the settings of the member runs. They never write through links,
+# into FIFOs, or into files that ensemble.sh did not create. Errors are reported by `fail` and `die` of ensemble.sh.
 
-# may_be_ours FILE: returns success if FILE does not exist or is an ordinary file.
+# may_be_ours FILE: succeeds if FILE does not exist or is an ordinary file.
 may_be_ours() { [[ ! -L $1 && (! -e $1 || -f $1) ]]; }
 
 check_ordinary() {
@@ -14,8 +13,8 @@ check_ordinary() {
     fail 3 "$1 is not an ordinary file: remove it, or choose another folder"
 }
 
-# put FILE: writes standard input to FILE. The file is either written completely or not changed. An existing file is replaced by
-# a new file; therefore other hard links of the existing file keep its old contents.
+# put FILE: writes standard input to FILE, either completely or not at all. An existing file is replaced by a new one, so that other
+# hard links keep its old contents.
 put() {
   local new=$folder/.new.$$.${HOSTNAME:-} reason
   check_ordinary "$1"
@@ -25,8 +24,8 @@ put() {
   fi
 }
 
-# Sets `last_line` to the last line in the log file of the member run NAME. The function starts no other process, because a process
-# for each of up to 100 000 member runs would take too much time.
+# Sets `last_line` to the last line in the log file of the member run NAME, without starting a process, which would be too slow for
+# up to 100 000 member runs.
 read_last_line() {
   local lines=()
   last_line=''
@@ -45,14 +44,14 @@ last_words() {
 is_finished=': is a finished run, ' # the answer to --resume if a stop rule is met already
 goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line in the log of a member that has not failed
 
-# Returns success if the member run NAME has a finished output file, or an output file from which the member run can continue. If a
-# member run has failed, its log file states the reason.
+# Succeeds if the member run NAME has a finished output file, or one from which it can continue. The log file of a failed member run
+# states the reason.
 has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
 
-# An output file is not regarded as finished if it is older than the input file, or if a run is extending the output file.
+# An output file older than the input file, or being extended by a run, does not count as finished.
 is_done() { [[ -e $folder/$1.h5 && ! -e $folder/$1.h5.part && ! $folder/input.nml -nt $folder/$1.h5 ]]; }
 
-# may_continue NAME OVERRIDES: returns success if the program can continue the member run NAME with the settings OVERRIDES.
+# may_continue NAME OVERRIDES: succeeds if the program can continue the member run NAME with the settings OVERRIDES.
 may_continue() {
   local arguments=("$input" -o "$folder/$1.h5" --resume --check --quiet) said
   add_overrides "$2"
@@ -66,8 +65,8 @@ has_failed() {
   [[ ! $last_line =~ $goes_on ]]
 }
 
-# Opens the log file of a member run with the file descriptor `lock`. The log file must be an ordinary file with a single hard link,
-# and must not have been replaced since it was opened.
+# Opens the log file of a member run for appending, and stores its file descriptor in the variable `lock`. The function fails unless
+# the log file is an ordinary file with a single hard link that has not been replaced since it was opened.
 open_log() {
   may_be_ours "$1" && { exec {lock}>>"$1"; } 2>/dev/null || return
   [[ ! -L $1 && $1 -ef /dev/fd/$lock && $(stat -L -c %h "/dev/fd/$lock") == 1 ]] && return

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 
-# Produces the figures of all systems, and a page runs/figures/index.html that shows all figures.
+# Draws the figures of all systems, and writes runs/figures/index.html, which shows all of them.
 #
 # Examples of calls:
 #
@@ -33,8 +33,7 @@ for system; do
   esac
 done
 
-# For each existing figure, writes a section of the page with the name of the figure, its title, and the script that draws the
-# figure.
+# Writes a section of the page for each existing figure: its name, its title, and the script that draws it.
 section() {
   local name=$1 title=$2 script=$3 file
   for file in "$name".{png,mp4,gif}; do

@@ -1,14 +1,13 @@
 #!/usr/bin/env bash
 
-# Discharge rate of a hopper against the width of its mouth, compared with Beverloo's law in two dimensions. The mouth is the gap
-# between the lower ends of two walls, which are inclined by 45 degrees. Each width is simulated with two seeds. Films and pictures
-# show the hopper, a rotating drum, a dragged intruder and a stirrer. The script takes about five minutes of processor time.
+# Discharge rate of a hopper as a function of the width of its outlet, compared with Beverloo's law in two dimensions. The outlet is
+# the gap between the lower ends of two walls inclined by 45 degrees; each width is simulated with four seeds. Films and pictures
+# show the hopper, a rotating drum, a dragged intruder and a stirrer. Takes about five minutes of processor time.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Writes a manifest with a member run for each width and each seed. Disks that have fallen 0.05 below the mouth are recycled
-# (inserted again at the top).
+# Writes a manifest with a member run for each width and seed. Disks that have fallen 0.05 below the outlet are recycled to the top.
 for width in 0.10 0.12 0.16 0.20 0.24 0.28 0.32 0.36; do
-  for seed in 1 2; do
+  for seed in 1 2 3 4; do
     awk -v D="$width" -v seed="$seed" 'BEGIN {
       half = D / 2
       printf "width_%s_seed_%d\t--set run.seed=%d", D, seed, seed
@@ -22,7 +21,7 @@ runs/ensemble.sh input/hopper.nml -d "$data/discharge" --manifest "$data/dischar
   --set stop.time=24 --set output.frames_every_time=6 "$@"
 "$python" post/discharge.py "$data"/discharge/*.h5 -o "$figures/discharge.png" \
   --csv "$figures/discharge.csv"
-# Makes a film and a picture of the hopper, of a rotating drum, of a dragged intruder and of a stirrer.
+# Makes a film and a picture each of the hopper, a rotating drum, a dragged intruder and a stirrer.
 for system in hopper drum intruder stirrer; do
   runs/ensemble.sh "input/$system.nml" -d "$data/$system" --seeds 1 "$@"
   "$python" post/player.py "$data/$system/seed_1.h5" -o "$figures/$system.html"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 
-# The random Lorentz gas: one tracer moves among 100 000 scatterers, which may overlap, at six densities. The diffusion coefficient
-# of the tracer is compared with kinetic theory. The scatterers are placed differently in each run. The environment variable N sets
-# the number of scatterers, for example N=1000000. EVENTS sets the number of events of each run, for example EVENTS=10000000.
+# The random Lorentz gas: diffusion of one tracer among 100 000 randomly placed, possibly overlapping scatterers, at six densities,
+# compared with kinetic theory. Environment variables: N, the number of scatterers (for example N=1000000), and EVENTS, the number
+# of events of each run (for example EVENTS=10000000).
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 scatterers=${N:-100000} events=${EVENTS:-1000000} tracer=0.1 # the radii are 0.1 (tracer) and 0.9 (scatterers), so that R = 1
 
@@ -32,7 +32,7 @@ replace "$data/lorentz.nml" <<NML
 /
 NML
 
-# The interval between frames is ten mean free times; the mean free time is 1/(2 n R v).
+# Frames are ten mean free times apart; the mean free time is 1/(2 n R v).
 for density in 0.0025 0.005 0.01 0.02 0.04 0.08; do
   for seed in 1 2 3 4; do
     file=$data/scatterers_${scatterers}_${density}_$seed.txt

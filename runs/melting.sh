@@ -2,13 +2,12 @@
 
 # Melting of hard disks: pressure against packing fraction, and pictures of the bond-orientational order.
 #
-# Between the packing fractions 0.70 and 0.72, crystals melt and liquids freeze very slowly. Therefore the runs of 64^2 disks start
-# from a crystal of which about half has melted at a packing fraction of 0.66. There are two starting states: slightly less than
-# half of the crystal has melted in one, and slightly more than half in the other. The two starting states reveal whether the
-# results depend on the starting state. The runs of 128^2 disks start from four copies of the final state of 64^2 disks, with new
-# velocities. Without FULL=1, the script takes several minutes. The pressure P* near melting is then correct to 0.1, and warnings
-# name the packing fractions at which the two starting states yield different results. With FULL=1 the script performs longer runs,
-# and also runs of 256^2 disks, which takes about eight hours of processor time.
+# Between the packing fractions 0.70 and 0.72, crystals melt and liquids freeze very slowly. The runs of 64^2 disks therefore start
+# from two half-melted crystals, prepared at a packing fraction of 0.66: in one, slightly less than half has melted, in the other
+# slightly more. Differing results reveal a dependence on the initial state. The runs of 128^2 disks start from four copies of the
+# final states of 64^2 disks, with new velocities. Without FULL=1 the script takes several minutes; P* near melting is then correct
+# to 0.1, with warnings where the two initial states give different results. FULL=1 adds longer runs, and runs of 256^2 disks, which
+# take about eight hours of processor time.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 if [[ -n ${FULL:-} ]]; then
@@ -25,7 +24,7 @@ disks() { # arguments: number of disks along a side of the square, folder, furth
     --set "box.upper=$upper" --set "output.observables_every_collisions=$((5 * $1 ** 2))" "${@:3}"
 }
 
-# copy_four_times FOLDER NAME...: writes a starting file for each run, with 2 x 2 copies of the last frame of that run.
+# copy_four_times FOLDER NAME...: writes an initial-configuration file for each run, with 2 x 2 copies of its last frame.
 copy_four_times() {
   "$python" - "$@" <<'PYTHON'
 import sys

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 
-# Memory per disk in different kinds of runs, compared with the estimate of the program (src/start/memory.f90).
+# Memory per disk in different kinds of runs, compared with the program's own estimate (src/start/memory.f90).
 #
-# The script measures the largest resident memory of the process, and compares it with the estimate that the option --check prints.
-# The runs need about 250 bytes of memory per disk, or 700 bytes with neighbour lists. Other programs may run during the
-# measurements. The environment variable RICOCHET names the measured program (default build/ricochet).
+# Measured is the peak resident memory of the process, estimated is the value printed by --check. The runs need about 250 bytes per
+# disk, or 700 bytes with neighbour lists. Other programs may run meanwhile. The environment variable RICOCHET names the measured
+# program (default build/ricochet).
 #
 # Examples of calls:
 #
@@ -20,8 +20,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 verdict=0
 
-# kind DISKS NAME TEXT...: performs a run and prints a row of the table. The input file consists of the lines TEXT, in which %N is
-# replaced by the number of disks. If NAME begins with `keep`, the output file is kept, and other kinds of runs can start from it.
+# kind DISKS NAME TEXT...: performs a run and prints a row of the table. The input file consists of the lines TEXT, with %N replaced
+# by the number of disks. The output file is kept for other kinds of runs if NAME begins with `keep`.
 kind() {
   local disks=$1 name=$2 out=$work/run.h5 assumed used
   shift 2

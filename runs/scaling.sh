@@ -1,11 +1,10 @@
 #!/usr/bin/env bash
 
-# Speedup of a simulation that uses several cores of this computer. The script takes about five minutes, and no other program should
-# run during this time. `make figures` does not call this script. The simulated systems are gases in a box with walls at a packing
-# fraction of 0.5. Each run has 6 million collisions, or 15 million collisions for a million disks. Each system is simulated three
-# times, alternately with 1, 2, 4, ... threads up to the number of cores.
+# Speed-up of runs on several cores of this computer. Takes about five minutes, in which no other program should run; not part of
+# `make figures`. The systems are gases between walls at a packing fraction of 0.5, simulated for 6 million collisions (15 million
+# for a million disks). Each system is simulated three times, alternately with 1, 2, 4, ... threads up to the number of cores.
 #
-# The script post/scaling.py draws the figure. To repeat the measurement, remove the folder runs/scaling.
+# post/scaling.py draws the figure. To repeat the measurement, remove the folder runs/scaling.
 #
 # Examples of calls:
 #

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 
-# Exercise S1: scattering angle of a light disk that collides with a heavy disk, for 81 impact parameters b/R12 between -1.2 and
+# Exam, problem 1: scattering angle of a light disk that collides with a heavy disk, for 81 impact parameters b/R12 between -1.2 and
 # 1.2.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 
-# A sequence of runs of one system. Each run starts from the last frame of the previous run. The system is compressed in two steps,
-# relaxed, cooled, heated and expanded.
+# A sequence of runs, each starting from the last frame of the previous one: compression in two steps, relaxation, cooling, heating
+# and expansion.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 stage() { # arguments: name, name of the previous run, further options of ensemble.sh

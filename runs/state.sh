@@ -1,11 +1,10 @@
 #!/usr/bin/env bash
 
-# Properties of hard disks in a periodic box: equation of state, time correlations, order, and Haff's law; four seeds each.
+# Hard disks in a periodic box: equation of state, time correlations, order, and Haff's law; four seeds each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# In the runs for the pressure, the initial positions depend on the packing fraction. Initial positions are random for packing
-# fractions up to 0.5, result from Lubachevsky-Stillinger compression between 0.5 and 0.7, and form a crystal in a commensurate box
-# for 0.72 and above.
+# Initial positions for the pressure: random up to a packing fraction of 0.5, from Lubachevsky-Stillinger compression between 0.5
+# and 0.7, and a crystal in a commensurate box from 0.72 on.
 runs/ensemble.sh input/bulk.nml -d "$data/fluid" --seeds 1-4 \
   --scan species.disks.packing_fraction=0.05,0.1,0.15,0.2,0.25,0.3,0.35,0.4,0.45,0.5 "$@"
 runs/ensemble.sh input/bulk.nml -d "$data/dense" --seeds 1-4 --set species.disks.placement=dense \
@@ -17,8 +16,8 @@ runs/ensemble.sh input/bulk.nml -d "$data/crystal" --seeds 1-4 \
 "$python" post/equation_of_state.py "$data"/{fluid,dense,crystal}/*.h5 \
   -o "$figures/equation_of_state.png" --csv "$figures/equation_of_state.csv"
 
-# In the runs for time correlations, the interval between frames is about a tenth of the mean free time at each packing fraction.
-# All disks start with the same speed.
+# For time correlations, frames are about a tenth of the mean free time apart at each packing fraction. All disks start with the
+# same speed.
 memory=()
 while read -r packing interval placement; do
   runs/ensemble.sh input/bulk.nml -d "$data/memory_$packing" --seeds 1-4 \
@@ -37,8 +36,7 @@ TABLE
   --csv "$figures/correlations.csv"
 "$python" post/rates.py "$data"/memory_0.3/*.h5 -o "$figures/rates.png" --csv "$figures/rates.csv"
 
-# In the runs for the cooling of a dilute gas, the theory applies until flows and clusters develop (shear and clustering
-# instability).
+# The theory of the cooling of a dilute gas applies until flows and clusters develop (shear and clustering instability).
 runs/ensemble.sh input/bulk.nml -d "$data/cooling" --seeds 1-8 \
   --set species.disks.packing_fraction=0.02 --set stop.collisions_per_disk=60 \
   --set output.observables_every_collisions=100 --scan contact.restitution=0.95,0.9,0.8 "$@"
