@@ -28,14 +28,12 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "post"), str(ROOT / "tests")]
 
-import crater_scan  # noqa: E402
-import discharge  # noqa: E402
-import driven  # noqa: E402
-import equipartition  # noqa: E402
-import gravity  # noqa: E402
-import lyapunov  # noqa: E402
-import missed  # noqa: E402
-import mixture  # noqa: E402
+from ricochet.reports.grains import crater_scan, discharge  # noqa: E402
+from ricochet.reports.equilibrium import driven, equipartition  # noqa: E402
+from ricochet.reports.equilibrium import gravity  # noqa: E402
+from ricochet.reports.trajectories import lyapunov  # noqa: E402
+from ricochet.reports.equilibrium import missed  # noqa: E402
+from ricochet.reports.equilibrium import mixture  # noqa: E402
 import numpy as np  # noqa: E402
 import scipy  # noqa: E402
 from ricochet import (  # noqa: E402
@@ -132,10 +130,9 @@ def of_mixture(run: Run) -> Found:
 
 def of_driven(show: str, run: Run) -> Found:
     """driven.py, in the second half of the time."""
-    _, curves, _, compared = driven.QUANTITIES[show]
-    found = {}
-    for name, (time, value) in curves(run).items():
-        half = compared(value[time >= (time[0] + time[-1]) / 2])
+    quantity, found = driven.QUANTITIES[show], {}
+    for name, curve in quantity.curves(run).items():
+        half = driven.late(curve, quantity.compared)
         found[f"{show} {name}"] = statistics.correlated_mean(half)[:2]
         if show == "width":
             square = statistics.correlated_mean((half - half.mean()) ** 2)

@@ -5,12 +5,10 @@
 
 The test works in build/mutants, on a copy of the last commit.  A repeated call continues an
 interrupted test, because the file `results` in this folder contains a line for each tested mutant
-(source with one fault) of each commit.  First, the copy is tested without a fault.  For each
-mutant, the unit tests and all other tests are then executed up to the first failure.  A mutant
-takes several minutes on two cores; a mutant that no test detects takes as long as `make test`.  Use
-`nice` if other programs run at the same time.  On a busy machine a test can fail because it has
-waited too long, which does not count as a detection; the file `NAME.log` shows the reason of the
-failure.  With `--check` the script only checks that each text to be replaced occurs exactly once.
+(source with one fault) of each commit.  For each mutant, the tests of `make test` are executed up
+to the first failure, as `mutant_bench.py` describes.  Most mutants take half a minute; a mutant
+that no test detects takes as long as `make test`.  With `--check` the script only checks that each
+text to be replaced occurs exactly once.
 
 The file mutants.diff describes each fault by a sentence and by a change of the present sources.  If
 the sources are rewritten, the sentence is kept and the change is expressed in the new sources.
@@ -28,40 +26,14 @@ the compiler (access beyond an array), or if they are in code that was to be rem
 
 import argparse
 import re
-import shutil
-import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).resolve().parents[1]
+from mutant_bench import ROOT, Bench, git
+
 SCRATCH = ROOT / "build" / "mutants"
-#: Variables of `make checked`. With any others it would compile everything again.
-UNIT_BUILD = re.findall(r"^unit_build := (.*)", (ROOT / "Makefile").read_text(), re.MULTILINE)[0]
-UNIT_BUILD = UNIT_BUILD.replace("$(BUILD)", "build")
-UNIT_TESTS = ("make -j{jobs} {unit_build}/unit_tests", "make checked")
-PROGRAM = "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all && make {library}"
-PYTEST = "RICOCHET_LIBRARY=$PWD/build/tests "
-PYTEST += ".venv/bin/python -m pytest -q -x -n {jobs} --dist load --maxschedchunk 8 -p no:randomly "
 MUTANT = re.compile(r"^([\w-]+): .*\n--- (.*)\n((?:.*\n)+?)(?=\n[\w-]+: |\Z)", re.MULTILINE)
-FAILURE = re.compile(r"^(?:Failure in: |FAILED |ERROR |unit tests: )(.*?)(?: - .*)?$", re.MULTILINE)
-
-
-def git(*arguments: str, folder: Path = ROOT) -> str:
-    return subprocess.check_output(["git", *arguments], cwd=folder, text=True).strip()
-
-
-def check_out(commit: str) -> Path:
-    """Make a copy of the project at a commit, with the existing build."""
-    tree = SCRATCH / "tree"
-    if not tree.exists():
-        git("clone", "--quiet", "--shared", "--no-checkout", str(ROOT), str(tree))
-    git("checkout", "--quiet", "--force", "--detach", commit, folder=tree)
-    git("clean", "--quiet", "--force", "-d", folder=tree)
-    if (ROOT / ".venv").exists() and not (tree / ".venv").exists():
-        shutil.copytree(ROOT / ".venv", tree / ".venv", symlinks=True)
-    subprocess.run([".ci/set-up", "demo", "test"], cwd=tree, check=True)
-    return tree
 
 
 class Mutant(NamedTuple):
@@ -88,31 +60,20 @@ def applies(mutant: Mutant, tree: Path) -> bool:
     return path.exists() and path.read_text().count(mutant.old) == 1
 
 
-def outcome(tree: Path, mutant: Mutant | None, jobs: int, log: Path) -> str:
-    """Return the outcome of the tests in a tree with one fault or without a fault."""
-    steps = [*UNIT_TESTS, PROGRAM, PYTEST + "tests"]
-    if mutant:
-        if not applies(mutant, tree):
-            return "does not apply"
-        path = tree / mutant.file
-        path.write_text(path.read_text().replace(mutant.old, mutant.new))
-        if path.is_relative_to(tree / "post"):
-            steps = steps[2:]
-    for step in steps:
-        variables = {"unit_build": f"{UNIT_BUILD} build/tests", "library": f"{UNIT_BUILD} library"}
-        command = step.format(jobs=jobs, **variables)
-        with log.open("w") as output:
-            failed = subprocess.call(command, shell=True, cwd=tree, stdout=output, stderr=output)
-        if failed:
-            if step.startswith("make -j"):
-                return "does not compile"
-            said = log.read_text(errors="replace")
-            return "caught: " + (", ".join(FAILURE.findall(said)[:3]) or said.split("\n")[-2])
-    return "survived"
+def outcome(bench: Bench, mutant: Mutant) -> str:
+    """Return the outcome of the tests of `make test` for a mutant."""
+    if not applies(mutant, bench.tree):
+        return "does not apply"
+    text = (bench.tree / mutant.file).read_text()
+    with bench.changed(mutant.file, text.replace(mutant.old, mutant.new)):
+        if bench.build():  # for a Python file without the previous fault
+            return "does not compile"
+        found = bench.first(mutant.file) or bench.rest(mutant.file)
+    return f"caught: {', '.join(found[:3])}" if found else "survived"
 
 
 def main() -> int:
-    """Print the outcome of each mutant; return 1 if a mutant survives."""
+    """Print the outcome of each mutant; return 1 unless a test detects each of them."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="of the mutants [all]")
     parser.add_argument("--jobs", type=int, default=2, help="at a time [%(default)s]")
@@ -126,23 +87,19 @@ def main() -> int:
         lost = [name for name, mutant in table.items() if not applies(mutant, ROOT)]
         print("".join(f"{name}: its text is not found once\n" for name in lost), end="")
         return 1 if lost else 0
-    SCRATCH.mkdir(parents=True, exist_ok=True)
     commit = git("rev-parse", "--short=12", args.commit)
-    results = SCRATCH / "results"
+    bench, results = Bench(SCRATCH, commit, args.jobs), SCRATCH / "results"
     results.touch()
     known = dict(line.split("\t") for line in results.read_text().splitlines())
     survived = 0
-    for name in ["nothing", *(args.names or table)]:
-        key, mutant = f"{commit} {name}", table.get(name)
+    for name in args.names or table:
+        key = f"{commit} {name}"
         if key not in known:
-            known[key] = outcome(check_out(commit), mutant, args.jobs, SCRATCH / f"{name}.log")
+            known[key] = outcome(bench, table[name])
             with results.open("a") as file:
                 file.write(f"{key}\t{known[key]}\n")
         print(f"{name}: {known[key]}", flush=True)
-        if not mutant and known[key] != "survived":
-            print("The tests fail without a fault: first make them pass.", file=sys.stderr)
-            return 1
-        survived += bool(mutant) and known[key] == "survived"
+        survived += not known[key].startswith("caught")
     return 1 if survived else 0
 
 

@@ -16,38 +16,28 @@ lost
     the tests that `make test` leaves out: the unit tests with all random cases (THOROUGH=1), and
     tests with the mark `statistics`
 
-The tests that the table of the folder names for the mutated file run first, because they detect
-most faults.  If they fail, the fault is kept's, and nothing else runs.  Otherwise the lost tests
-run.  If the lost tests pass, the fault cannot be detected by them alone; then the remaining kept
-tests run only with `--rest`.  If the lost tests fail, the remaining kept tests run, too.
+`mutant_bench.py` describes the order of the tests.  If the first tests detect a fault, it is a
+fault that kept tests detect, and nothing else runs.  Otherwise the lost tests run.  If the lost
+tests pass, the fault cannot be detected by them alone; then the remaining kept tests run only with
+`--rest`.  If the lost tests fail, the remaining kept tests run, too.
 
-The script returns 1 if a fault is detected by lost tests alone.  All programs and libraries have
-run-time checks (the build of the unit tests), because this build takes seconds after a change.
-Lost tests that pass without any program do not run for mutants of Fortran files.  The script works
-in build/random_mutants, on a copy of the last commit.  A repeated call continues an interrupted
-one, because the file `results` contains a line for each tested mutant of each commit.  A test of
-pytest must fail twice, as on a busy machine it can fail because it has waited too long.
+The script returns 1 if a fault is detected by lost tests alone.  Lost tests that use no program do
+not run for mutants of Fortran files.  The script works in build/random_mutants, on a copy of the
+last commit.  A repeated call continues an interrupted one, because the file `results` contains a
+line for each tested mutant of each commit.
 """
 
 import argparse
 import ast
 import io
-import os
 import random
 import re
-import shlex
-import shutil
-import subprocess
 import sys
 import tokenize
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 from typing import NamedTuple
 
-from mutants import FAILURE, ROOT, UNIT_BUILD, git
-
-sys.path.insert(0, str(Path(__file__).parent / "support"))
-from protecting_tests import protecting_tests
+from mutant_bench import ROOT, Bench, git
 
 SCRATCH = ROOT / "build" / "random_mutants"
 FOLDERS = {"src": ".f90", "post/ricochet": ".py"}
@@ -72,12 +62,10 @@ PYTHON_SWAPS = [
     (r"\b(True)\b", "False"), (r"\b(False)\b", "True"), (r"\b(not )", ""),
     (r"\b(min)\(", "max"), (r"\b(max)\(", "min"),
 ]  # fmt: skip
-IMPORTS = re.compile(r"^from ricochet[\w.]* import (?:\([^)]*\)|.*)", re.MULTILINE)
-PYTEST = "timeout 3600 prlimit --cpu=400 .venv/bin/python -m pytest -q -p no:randomly"
 NUMBER = re.compile(r"(?<![\w.])(\d+)(?=(\.\d+)?(?:_\w+)?(?![\w.]))")
 CONDITION = re.compile(r"^\s*(?:else )?if \(")
 STATEMENT = re.compile(
-    r"^\s*(?:if \(.*\) )?(?:call \w|\w[\w%(),: +*-]* = |return|exit|cycle|deallocate)"
+    r"^\s*(?:if \(.*\) )?(?!do )(?:call \w|\w[\w%(),: +*-]* = |return|exit|cycle|deallocate)"
 )
 
 
@@ -176,103 +164,18 @@ def drawn(rng: random.Random, files: dict[str, list[str]]) -> Mutant | None:
     return None
 
 
-class Bench:
-    """A copy of the project in which mutants are built and tested."""
-
-    def __init__(self, jobs: int, of_program: str):
-        """Make the copy, and test it without a fault unless `of_program` is known already."""
-        self.tree, self.jobs, self.log = SCRATCH / "tree", jobs, SCRATCH / "log"
-        if not self.tree.exists():
-            git("clone", "--quiet", "--shared", "--no-checkout", str(ROOT), str(self.tree))
-        self.restore()
-        for name in (".venv", "build/tests"):
-            if (ROOT / name).exists() and not (self.tree / name).exists():
-                shutil.copytree(ROOT / name, self.tree / name, symlinks=True)
-        subprocess.run([".ci/set-up", "demo", "test"], cwd=self.tree, check=True)
-        self.of_program = of_program.split("; ")
-        if not of_program:
-            units = self.build() or self.units(thorough="1")
-            if said := units or self.pytest("-m statistics tests"):
-                raise SystemExit(f"The tests fail without a fault: {said}")
-            nothing = {"RICOCHET": "/", "RICOCHET_LIBRARY": "/"}
-            self.of_program = self.run(f"{PYTEST} -n {jobs} -m statistics tests", **nothing)
-
-    def restore(self) -> None:
-        commit = git("rev-parse", "HEAD")
-        git("checkout", "--quiet", "--force", "--detach", commit, folder=self.tree)
-
-    def apply(self, mutant: Mutant) -> None:
-        path = self.tree / mutant.file
-        lines = path.read_text().splitlines()
-        lines[mutant.line - 1] = mutant.new
-        path.write_text("\n".join(lines) + "\n")
-
-    def run(self, command: str, **variables: str) -> list[str]:
-        """Run a command; if it fails, return the names of tests or the last words of its output."""
-        build = f"{self.tree}/build/tests"
-        own = {"RICOCHET": f"{build}/ricochet", "RICOCHET_LIBRARY": build} | variables
-        with self.log.open("w") as output:
-            streams = {"stdout": output, "stderr": output, "env": os.environ | own}
-            failed = subprocess.call(command, shell=True, cwd=self.tree, **streams)
-        said = self.log.read_text(errors="replace")
-        return (FAILURE.findall(said) or [" ".join(said.split()[-30:])]) if failed else []
-
-    def build(self) -> list[str]:
-        make = f"make -j{self.jobs} {UNIT_BUILD}"
-        return self.run(f"{make} build/tests/unit_tests build/tests/ricochet && {make} library")
-
-    def units(self, files: Sequence[str] = (), thorough: str = "") -> list[str]:
-        """Run unit tests of some suites or of all."""
-        program = "OMP_WAIT_POLICY=passive prlimit --cpu=600 --as=8000000000 build/tests/unit_tests"
-        runs = [f"{program} -f {Path(file).stem}." for file in files] or [program]
-        return self.run(" && ".join(runs), THOROUGH=thorough)
-
-    def pytest(self, *words: str) -> list[str]:
-        """Run tests until one fails twice: on a busy machine a test can fail by chance."""
-        flags, passed = f"-x -n {self.jobs} --dist worksteal", []
-        while found := self.run(" ".join([PYTEST, flags, *words, *passed])):
-            names = [shlex.quote(name) for name in found if "::" in name]
-            if not names or self.run(" ".join([PYTEST, "-m ''", *names])):
-                return found
-            passed += [f"--deselect {name}" for name in names]
-        return []
-
-    def first(self, mutant: Mutant) -> list[str]:
-        """Run the tests that are most likely to detect a mutant; all of them are kept tests."""
-        files = protecting_tests(self.tree).get(mutant.file, [])
-        units = [name for name in files if name.endswith(".pf")]
-        runs = [f"tests/*/{name}" for name in files if name.endswith(".py")]
-        if mutant.file.endswith(".py"):
-            word = re.compile(rf"\b{Path(mutant.file).stem}\b")
-            every = sorted((self.tree / "tests").glob("*/test_*.py"))
-            runs = [str(path.relative_to(self.tree)) for path in every
-                    if word.search("".join(IMPORTS.findall(path.read_text())))]  # fmt: skip
-        return (self.units(units) if units else []) or (self.pytest(*runs) if runs else [])
-
-    def lost(self, mutant: Mutant) -> list[str]:
-        """Run the tests that `make test` leaves out."""
-        if mutant.file.endswith(".py"):
-            return self.pytest("-m statistics tests")
-        names = map(shlex.quote, self.of_program)
-        return self.units(thorough="1") or self.pytest("-m statistics", *names)
-
-    def rest(self, mutant: Mutant) -> list[str]:
-        """Run all kept tests."""
-        return (self.units() if mutant.file.endswith(".f90") else []) or self.pytest("tests")
-
-    def outcome(self, mutant: Mutant, rest: bool) -> list[str]:
-        """Return the tests that detect a mutant: kept, lost; `-` if not run, '' if none does."""
-        self.apply(mutant)
-        try:
-            if mutant.file.endswith(".f90") and self.build():
-                return ["does not compile"]
-            kept, lost = self.first(mutant), ["-"]
-            if not kept:
-                lost = self.lost(mutant)
-                kept = self.rest(mutant) if lost or rest else ["-"]
-            return ["; ".join(kept[:2]), "; ".join(lost[:2])]
-        finally:
-            self.restore()
+def outcome(bench: Bench, mutant: Mutant, rest: bool) -> list[str]:
+    """Return the tests that detect a mutant: kept, lost; `-` if not run, '' if none does."""
+    lines = (bench.tree / mutant.file).read_text().splitlines()
+    lines[mutant.line - 1] = mutant.new
+    with bench.changed(mutant.file, "\n".join(lines) + "\n"):
+        if bench.build():  # for a Python file without the previous fault
+            return ["does not compile"]
+        kept, lost = bench.first(mutant.file), ["-"]
+        if not kept:
+            lost = bench.lost(mutant.file)
+            kept = bench.rest(mutant.file) if lost or rest else ["-"]
+    return ["; ".join(kept[:2]), "; ".join(lost[:2])]
 
 
 def main() -> int:
@@ -284,34 +187,27 @@ def main() -> int:
     parser.add_argument("--draw", action="store_true", help="only print the mutants")
     parser.add_argument("--rest", action="store_true", help="run all kept tests in any case")
     args = parser.parse_args()
-    files = {
-        str(path.relative_to(ROOT)): path.read_text().splitlines()
-        for folder, kind in FOLDERS.items()
-        for path in sorted((ROOT / folder).rglob(f"*{kind}"))
-    }
     rng, tested, alone = random.Random(args.seed), 0, 0
-    SCRATCH.mkdir(parents=True, exist_ok=True)
-    results = SCRATCH / "results"
-    results.touch()
-    commit = git("rev-parse", "--short=12", "HEAD")
-    known = dict(line.split("\t", 1) for line in results.read_text().splitlines())
-
-    def store(key: str, found: list[str]) -> None:
-        known[key] = "\t".join(found)
-        with results.open("a") as file:
-            file.write(f"{key}\t{known[key]}\n")
-
-    if not args.draw:
-        bench = Bench(args.jobs, known.get(f"{commit} nothing", ""))
-        if f"{commit} nothing" not in known:
-            store(f"{commit} nothing", ["; ".join(bench.of_program)])
+    commit, results = git("rev-parse", "--short=12", "HEAD"), SCRATCH / "results"
+    bench = None if args.draw else Bench(SCRATCH, commit, args.jobs)
+    tree = bench.tree if bench else ROOT
+    files = {
+        str(path.relative_to(tree)): path.read_text().splitlines()
+        for folder, kind in FOLDERS.items()
+        for path in sorted((tree / folder).rglob(f"*{kind}"))
+    }
+    known = {}
+    if results.exists():
+        known = dict(line.split("\t", 1) for line in results.read_text().splitlines())
     while tested < args.count:
         mutant = drawn(rng, files)
         if not mutant:
             continue
         key = f"{commit} {args.seed} {mutant.name} {mutant.new.strip()}"
-        if not args.draw and key not in known:
-            store(key, bench.outcome(mutant, args.rest))
+        if bench and key not in known:
+            known[key] = "\t".join(outcome(bench, mutant, args.rest))
+            with results.open("a") as file:
+                file.write(f"{key}\t{known[key]}\n")
         found = known.get(key, "").split("\t")
         if found == ["does not compile"]:
             continue

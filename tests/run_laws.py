@@ -43,6 +43,11 @@ def of_box(found: Found) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return found[f"{box}/lower"], found[f"{box}/edges"], found[f"{box}@boundary"] == b"periodic"
 
 
+def is_open(found: Found) -> bool:
+    """Return whether disks can leave or enter the box."""
+    return "/observables/inside/value" in found
+
+
 def imbalance(found: Found) -> float:
     """Return the error of the energy balance relative to its largest term.
 
@@ -50,12 +55,14 @@ def imbalance(found: Found) -> float:
     taken back, and the kT that a thermal wall gives at one hit and may take back at the next.
     """
     signs = {"total_energy": 1, "dissipated_energy": 1, "heat": -1, "work": -1, "drive_energy": -1}
+    signs |= {"outflow_energy": 1, "inflow_energy": -1}
     terms = {name: series(found, name) for name in signs if f"/observables/{name}/value" in found}
     balance = sum(signs[name] * values for name, values in terms.items())
     mass = found["/particles/disks/mass"]
     kick = [found.get(f"/parameters/drive@{name}", 0) for name in ("strength", "interval")]
     bath = ("@temperature", "parameters/wall/temperature", "parameters/obstacle/temperature")
-    kinetic = len(mass) * series(found, "all/kinetic_energy")  # a mean in the file
+    inside = series(found, "inside") if is_open(found) else len(mass)
+    kinetic = np.nan_to_num(inside * series(found, "all/kinetic_energy"))  # a mean in the file
     parts = [kinetic, terms["total_energy"] - kinetic, *terms.values()]
     parts += [mass.max() * np.prod(kick), *(x for name, x in found.items() if name.endswith(bath))]
     most = max(np.nanmax(np.abs(part), initial=0) for part in parts)
@@ -66,6 +73,7 @@ def momentum_drift(found: Found) -> float:
     """Return the largest change of a conserved momentum, relative to the sum of m |v|."""
     drive = found["/parameters/drive@kind"] != b"none"
     kept = of_box(found)[2].all() and not found.get("/parameters/box@shear_rate")
+    kept = kept and not is_open(found)
     if not kept or "/parameters/wall/name" in found or "/parameters/obstacle/name" in found:
         return 0.0
     if drive and not found.get("/parameters/drive@keep_momentum"):
@@ -94,10 +102,24 @@ def depth(found: Found) -> float:
     return deepest
 
 
+def of_present(found: Found, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the radii and positions of the disks that are in the box."""
+    inside = np.isfinite(place[:, 0])
+    return found["/particles/disks/radius"][inside], place[inside]
+
+
+def has_lid(found: Found, side: str) -> bool:
+    """Return whether a side is open, or may be open after a change."""
+    is_open = found.get(f"/parameters/side/{side}@open", 0)
+    return bool(is_open) or f"{side}.open=".encode() in bytes(found.get("/parameters/changes", b""))
+
+
 def pair_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
     """Return the gaps of close pairs, each found from its larger disk, and contact distances."""
     lower, edges, periodic = of_box(found)
-    radius = found["/particles/disks/radius"]
+    radius, place = of_present(found, place)
+    if not len(place):
+        return
     rows = [(0.0, 0.0)]
     if periodic[1]:
         slide = found.get("/parameters/box@shear_rate", 0) * edges[1] * time
@@ -123,9 +145,12 @@ def pair_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
 def wall_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
     """Return the gaps of all disks to each wall, and their radii."""
     lower, edges, periodic = of_box(found)
-    radius = found["/particles/disks/radius"]
+    radius, place = of_present(found, place)
     for k, name in enumerate(SIDES):
-        if not periodic[k // 2]:
+        if has_lid(found, name):  # centres reach its line while it is open
+            inwards = (place[:, k // 2] - lower[k // 2]) * (-1) ** k + (k % 2) * edges[k // 2]
+            yield inwards, radius
+        elif not periodic[k // 2]:
             inwards = place[:, k // 2] - lower[k // 2]
             if k % 2:
                 inwards = edges[k // 2] - inwards
@@ -231,7 +256,8 @@ def log_error(found: Found) -> float:
         count, last = series(found, f"{name}/collisions"), series(found, f"{name}/impulse")
         if len(count):
             struck = np.isin(j, rows)
-            wrong.append(np.sum(struck) - count[-1])
+            left = series(found, f"{name}/left")  # departures are events, but not collisions
+            wrong.append(np.sum(struck) - count[-1] - (left[-1] if len(left) else 0))
             mine = change[struck]
             scale = 1e-12 * np.abs(mine).sum() + 1e-300
             wrong += list((mine.sum(axis=0) + last[-1]) / scale)
@@ -241,8 +267,10 @@ def log_error(found: Found) -> float:
 def observable_error(found: Found) -> float:
     """Return the differences of the final observables from values computed with the last frame."""
     v, mass = found["/particles/disks/velocity/value"][-1], found["/particles/disks/mass"]
-    if v.dtype != np.float64:
+    inside = np.isfinite(v[:, 0])
+    if v.dtype != np.float64 or not inside.any():
         return 0.0
+    v, mass = v[inside], mass[inside]
     speed = np.hypot(*v.T)
     pairs = [
         (series(found, "all/kinetic_energy")[-1], mass * speed**2 / 2 / len(mass)),
@@ -250,8 +278,8 @@ def observable_error(found: Found) -> float:
         *zip(series(found, "momentum")[-1], (mass[:, None] * v).T, strict=True),
     ]
     if "/particles/disks/angular_velocity/value" in found:
-        spin = found["/particles/disks/angular_velocity/value"][-1]
-        square = mass * found["/particles/disks/radius"] ** 2 * spin**2
+        spin = found["/particles/disks/angular_velocity/value"][-1][inside]
+        square = mass * found["/particles/disks/radius"][inside] ** 2 * spin**2
         energy = found["/parameters/contact@inertia"] * square / 2 / len(mass)
         pairs.append((series(found, "all/rotational_energy")[-1], energy))
     return max(abs(told - one.sum()) / (1e-12 * np.abs(one).sum() + 1e-300) for told, one in pairs)

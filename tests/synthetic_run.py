@@ -2,21 +2,28 @@
 
 import csv
 import importlib
+import os
+import re
 import sys
 import warnings
 from pathlib import Path
 from unittest import mock
 
 import h5py
+import matplotlib
 import numpy as np
 
 from ricochet import read_run
+from ricochet import script
+from ricochet.figures.drawing import plt, save
 from ricochet.script import launch
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Scripts that read runs; the laboratory makes runs.
 SCRIPTS = sorted(
-    path.stem for path in (ROOT / "post").glob("*.py") if "command_line(" in path.read_text()
+    path.stem
+    for path in (ROOT / "post").glob("*.py")
+    if re.search(r"(command_line|run_analysis)\(", path.read_text())
 )
 
 
@@ -131,19 +138,40 @@ def maxwell_velocities(rng, frames, count, temperature=1.0, mass=1.0):
     return rng.normal(0.0, np.sqrt(temperature / np.mean(mass)), (frames, count, 2))
 
 
+def save_at_once(figure, *more):
+    """Save a figure without the layout, which takes a quarter of the time of a script.
+
+    With THOROUGH, and in tests that draw figures themselves, figures have their layout.
+    """
+    if not os.environ.get("THOROUGH"):
+        figure.set_layout_engine("none")
+    save(figure, *more)
+
+
 def run_script(name, *arguments):
     """Run post/NAME.py as from the command line, in this process; returns the exit code.
 
     Warnings are errors.
     """
     module, words = importlib.import_module(name), [f"{name}.py", *map(str, arguments)]
-    with mock.patch.object(sys, "argv", words), warnings.catch_warnings():
+    saving = save_at_once if script.save is save else script.save  # a test may collect figures
+    quick = mock.patch.object(script, "save", saving)
+    with quick, mock.patch.object(sys, "argv", words), warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
             launch(module.main)
         except SystemExit as end:
             return end.code or 0
     return 0
+
+
+def run_code(code):
+    """Execute the Python code of a page in this process; warnings for users are errors."""
+    matplotlib.use("Agg")
+    with warnings.catch_warnings(), plt.style.context("default"):
+        warnings.simplefilter("error", UserWarning)
+        exec(code, {"__name__": "__main__"})
+    plt.close("all")
 
 
 def refusal(capsys, script, *arguments, code=2):

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -162,11 +163,12 @@ PATIENCE = 900
 
 
 def wait_for(condition):
-    """Returns when the condition holds."""
-    end = time.monotonic() + PATIENCE
+    """Returns when the condition holds. The longer the wait, the less often one looks."""
+    begin = time.monotonic()
     while not condition():
-        assert time.monotonic() < end, "nothing happened"
-        time.sleep(0.005)
+        waited = time.monotonic() - begin
+        assert waited < PATIENCE, "nothing happened"
+        time.sleep(min(max(0.005, waited / 10), 0.05))
 
 
 # --- Processes: what they do is known from the system, not from the time that has passed ---
@@ -185,6 +187,12 @@ def processor_time(pid) -> float:
 def within(seconds) -> list[str]:
     """The beginning of a command that is killed when it has used so much processor time, if any."""
     return ["prlimit", f"--cpu={seconds}"] if seconds else []
+
+
+def with_parent(*command) -> list:
+    """Return a command that ends with the process that starts it, even if that is killed."""
+    tied = ["setpriv", "--pdeathsig", "TERM"] if shutil.which("setpriv") else []
+    return [*tied, *command]
 
 
 def is_asleep(pid) -> bool:

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from player import scene
+from ricochet.figures.film_data import scene
 from ricochet import Simulation, read_run
 from ricochet.analysis.fields import accessible
 from ricochet.drawing import draw_box

@@ -1,7 +1,7 @@
 """Inelastic collapse: the report of the program against a calculation with 600 digits.
 
 The random systems are rows of two to eight disks, free, at a wall or nearly straight in the plane,
-with equal or unequal masses and with a common velocity.
+with equal or unequal masses and with a common velocity; and nearly straight rows of rough disks.
 """
 
 import os
@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from ricochet import Simulation, read_run
 
-from whole_runs import FINISHED, STOPPED, write_input
+from whole_runs import FINISHED, STOPPED, differences, write_input
 
 RADIUS = 0.0625
 KINDS = ("row", "wall", "plane", "masses")
@@ -30,6 +30,8 @@ def limit(disks: int, walls: int) -> float:
 
 class System:
     """A random row of disks that approach each other."""
+
+    tangential, friction, precision, height = -1.0, None, 600, 1.0
 
     def __init__(self, seed: int):
         """Draw the system with the given seed."""
@@ -68,8 +70,11 @@ class System:
         x, v = self.x * length, (self.v + np.array([self.common, 0])) * (length / time)
         end = (70 + self.time * self.common) * length
         start = 0.0 if self.kind == "wall" else -70 * length
-        text = f"&box upper = {end!r}, {length!r} lower = {start!r}, {-length!r} /"
+        y = self.height * length
+        text = f"&box upper = {end!r}, {y!r} lower = {start!r}, {-y!r} /"
         text += f" &contact restitution = {self.restitution!r} wall_restitution = {self.wall!r}"
+        if self.tangential > -1:
+            text += f" tangential_restitution = {self.tangential!r} friction = {self.friction!r}"
         text += f" wall_rule = 'normal' / &stop time = {self.time * time!r} /\n"
         for k in order:
             place, speed = (", ".join(repr(float(a)) for a in b[k]) for b in (x, v))
@@ -78,7 +83,7 @@ class System:
         return text
 
     def collapses(self, factor: float = 1) -> bool:
-        """Return whether the collisions never end, by a calculation with 600 digits.
+        """Return whether the collisions never end, by a calculation with hundreds of digits.
 
         All coefficients of restitution are multiplied by the factor, up to 1. The relative
         velocities of a collapse have decreased by 100 powers of ten, or there have been 2500
@@ -86,7 +91,7 @@ class System:
         determine the last gaps.
         """
         with localcontext() as context:
-            context.prec = 600
+            context.prec = self.precision
             return self._goes_on(Decimal(factor))
 
     def is_near_a_limit(self) -> bool:
@@ -94,7 +99,7 @@ class System:
         return len({self.collapses(factor) for factor in (0.97, 1, 1.03)}) > 1
 
     def _goes_on(self, factor: Decimal) -> bool:
-        axes = range(2 if self.kind == "plane" else 1)
+        axes = range(2 if self.kind in ("plane", "rough") else 1)
         x, v = ([[Decimal(float(p[k])) for k in axes] for p in a] for a in (self.x, self.v))
         inverse_mass = [1 / Decimal(float(m)) for m in self.mass]
         sigma, left = 2 * Decimal(RADIUS), Decimal(self.time)
@@ -105,6 +110,7 @@ class System:
         pairs = [(i, j) for j in range(len(x)) for i in range(j) if j == i + 1 or len(axes) > 1]
         xi = [self.wall if self.kind == "wall" and i == 0 else self.restitution for i, _ in pairs]
         xi = [min(factor * Decimal(a), Decimal(1)) for a in xi]
+        rims = [Decimal(0)] * len(x)  # radius times angular velocity
         due = [contact_time(x[i], x[j], v[i], v[j], sigma) for i, j in pairs]
         for _ in range(2500):
             s = min(due)
@@ -122,6 +128,8 @@ class System:
             if abs(g) < Decimal("1e-100"):
                 return True
             impulse = (1 + xi[pair]) * g / (inverse_mass[i] + inverse_mass[j])
+            if self.tangential > -1:
+                self._apply_friction(i, j, n, abs(impulse), v, rims, inverse_mass)
             for k in axes:
                 v[i][k] += impulse * n[k] * inverse_mass[i]
                 v[j][k] -= impulse * n[k] * inverse_mass[j]
@@ -130,6 +138,40 @@ class System:
                     due[k] = contact_time(x[a], x[b], v[a], v[b], sigma)
             due[pair] = NEVER
         return True
+
+    def _apply_friction(self, i, j, n, normal_impulse, v, rims, inverse_mass) -> None:
+        """Change the velocities of two disks by the tangential impulse of their collision."""
+        along = (n[1], -n[0])
+        slip = sum((v[i][k] - v[j][k]) * along[k] for k in (0, 1)) - rims[i] - rims[j]
+        impulse = (1 + Decimal(self.tangential)) * slip / (inverse_mass[i] + inverse_mass[j]) / 3
+        largest = Decimal(self.friction) * normal_impulse
+        impulse = max(-largest, min(impulse, largest))
+        for k, sign in ((i, -1), (j, 1)):
+            v[k] = [v[k][c] + sign * impulse * along[c] * inverse_mass[k] for c in (0, 1)]
+            rims[k] += 2 * impulse * inverse_mass[k]
+
+
+class RoughSystem(System):
+    """A random row of three to five rough disks that is nearly straight."""
+
+    precision, height = 250, 9.0
+
+    def __init__(self, seed: int):
+        """Draw the system with the given seed."""
+        self.rng = rng = np.random.default_rng(seed)
+        self.kind = "rough"
+        self.disks = n = int(rng.choice([3, 3, 4, 5]))
+        self.wall, self.time, self.common = 1.0, 20.0, float(rng.choice([0, 2.5, 40]))
+        self.restitution = min(rng.uniform(0.1, 1.3) * limit(n, 0), 0.95)
+        self.tangential = rng.uniform(-1, 1)
+        self.friction = float(rng.choice([rng.uniform(0, 1), 1e9]))
+        self.x, self.v = np.zeros((n, 2)), np.zeros((n, 2))
+        self.x[:, 0] = np.cumsum(2 * RADIUS + rng.uniform(0.05, 1, n) * rng.choice([0.1, 1]))
+        self.x[:, 1] = rng.uniform(-1, 1, n) * 10 ** rng.uniform(-9, -2)
+        self.v[:, 0] = -np.sort(rng.uniform(-1, 1, n))
+        if rng.random() < 0.3:
+            self.v[:, 1] = rng.uniform(-1, 1, n) * 10 ** rng.uniform(-6, -1)
+        self.mass = np.ones(n) if rng.random() < 0.5 else 10 ** rng.uniform(-0.7, 0.7, n)
 
 
 def contact_time(x, y, v, w, sigma):
@@ -158,30 +200,44 @@ def test_a_run_reports_exactly_the_collapses(ricochet, tmp_path, seed):
     assert bool(reported(ricochet, tmp_path, system.text())) == system.collapses()
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_a_run_of_rough_disks_reports_exactly_the_collapses(ricochet, tmp_path, seed):
+    """Tangential impulses decide whether rough disks nearly in line collapse."""
+    system = RoughSystem(seed)
+    assert bool(reported(ricochet, tmp_path, system.text())) == system.collapses()
+
+
 @pytest.mark.check
 def test_many_runs_report_exactly_the_collapses(ricochet, tmp_path):
-    """540 systems, with other seeds if the variable SEED is set, as in `make check`.
+    """720 systems, with other seeds if the variable SEED is set, as in `make check`.
 
     Systems near a limit of collapse are excluded if the verdicts differ: there, rounding errors can
-    stop the time of a finite series.
+    stop the time of a finite series. A few rough systems are excluded elsewhere, but a run that
+    goes on never reports a collapse of them that is none.
     """
     first = 1000 * (1 + int(os.environ.get("SEED", "0")) % 10**6)
     excluded = 0
-    for seed in range(first, first + 540):
-        system = System(seed)
-        if bool(reported(ricochet, tmp_path, system.text())) != system.collapses():
-            assert system.is_near_a_limit(), seed
+    for seed in range(first, first + 720):
+        system = System(seed) if seed < first + 540 else RoughSystem(seed)
+        said = reported(ricochet, tmp_path, system.text())
+        if bool(said) != system.collapses():
+            is_rough = isinstance(system, RoughSystem)
+            allowed = is_rough and (not said or "time no longer advances" in said)
+            assert allowed or system.is_near_a_limit(), seed
             excluded += 1
-    assert excluded <= 40
+    assert excluded <= 50
 
 
 @pytest.mark.parametrize("seed", range(100, 112))
-def test_the_report_depends_neither_on_the_order_nor_on_binary_units(ricochet, tmp_path, seed):
-    """Other orders give the same verdict; binary units multiply the time of the collapse."""
+def test_the_report_depends_on_no_order_threads_fall_or_binary_units(ricochet, tmp_path, seed):
+    """The verdict is the same; binary units multiply the time of the collapse."""
     system = System(seed)
     said = reported(ricochet, tmp_path, system.text())
     order = system.rng.permutation(system.disks)
     assert bool(reported(ricochet, tmp_path, system.text(order))) == bool(said)
+    assert reported(ricochet, tmp_path, system.text() + "&run threads = 2 /") == said
+    falling = system.text().replace("&box ", "&box gravity = 0, -0.004 ")
+    assert bool(reported(ricochet, tmp_path, falling)) == bool(said)
     length, time = (2.0 ** int(power) for power in system.rng.integers(-60, 60, 2))
     again = reported(ricochet, tmp_path, system.text(length=length, time=time))
     assert bool(again) == bool(said)
@@ -217,6 +273,25 @@ def test_a_run_in_parts_reports_the_same_collapse(ricochet, tmp_path):
         said.append("collapsed" in disks.nature)
         assert said[-1] == ("collapsed" in whole.advance(events=events).nature)
     assert said == sorted(said) and not said[17] and said[-1]
+
+
+def test_the_series_in_a_checkpoint_do_not_depend_on_the_order_in_the_queue(ricochet, tmp_path):
+    write_input(
+        tmp_path,
+        """&run seed = 372281 /
+        &box lower = 0.007441736661315069, -0.9738892615369732
+          upper = 0.10744173666131507, 9.026110738463027 /
+        &species count = 9 packing_fraction = 0.0037479192872135617 placement = 'dense' speed = 1 /
+        &contact restitution = 0 wall_restitution = 0.4234442109596833 wall_rule = 'normal'
+          tangential_restitution = 1 friction = 10
+          wall_tangential_restitution = -0.24815727909603935 /
+        &stop events = 10716 at_rest = .true. time = 10 /""",
+    )
+    for queue in "calendar", "heap":
+        run = ricochet("gas.nml", "-o", f"{queue}.h5", "--quiet", f"--set=run.queue={queue}")
+        assert run.returncode == FINISHED
+    found = differences(tmp_path / "calendar.h5", tmp_path / "heap.h5")
+    assert [name for name in found if "parameters" not in name] == []
 
 
 def test_a_collapse_that_a_kick_or_a_change_prevents_is_not_reported(ricochet, tmp_path):

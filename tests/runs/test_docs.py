@@ -9,14 +9,14 @@ import textwrap
 import tomllib
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
 from check_docstrings import members_of
 from ricochet import Run, packages
-from synthetic_run import ROOT, write_run
-from whole_runs import differences, environment, ran
+from synthetic_run import ROOT, run_code, write_run
+from test_pages import run_shell
+from whole_runs import environment, ran
 
 PLACES = ("*.md", "docs/**/*.md", "*/README.md", "src/*/README.md")
 PAGES = sorted(page for place in PLACES for page in ROOT.glob(place))
@@ -84,10 +84,11 @@ def test_what_a_page_leads_to_and_names_is_there(page):
     local = [link.partition("#") for link in links if not link.startswith(ELSEWHERE)]
     assert [name for name, _, _ in local if not (page.parent / name).exists()] == []
     sections = [(page.parent / name, section) for name, _, section in local if section]
+    sections += [(page, link[1:]) for link in links if link.startswith("#")]
     assert [section for path, section in sections if section not in sections_of(path)] == []
     folders, endings = "post|runs|input|tests|src|docs", "py|sh|nml|f90|pf"
     named = re.findall(rf"\b((?:{folders})/(?:\w+/)*\w+\.(?:{endings})\b)", text)
-    new = re.findall(r"`(src/\S+)`, a new file|[Cc]reate a\s+file\s+`(\S+)`", text)
+    new = re.findall(r"`((?:src|post|tests)/\S+)`, a new file|[Cc]reate a\s+file\s+`(\S+)`", text)
     mine = {"runs/mine.nml", *(name for pair in new for name in pair)}
     missing = [name for name in named if not (ROOT / name).exists()]
     assert [name for name in missing if name not in mine and name == name.lower()] == []
@@ -160,7 +161,7 @@ def test_procedures_that_are_named_are_called_in_their_examples(tmp_path):
     ran(*make, cwd=ROOT, env=environment(), check=True)
     (tmp_path / "input").symlink_to(ROOT / "input")
     page = section("inside", "## Where is it decided …\\?")
-    short = dict(re.findall(r"\*(\w+)\* is\s+`([^`]+)`", page))
+    short = dict(re.findall(r"^- \*(\w+)\*: `([^`]+)`$", page, re.M))
     rows = re.findall(r"^\| (.+) \| (.+) \| ?(.*) \|$", page, re.M)
     rows = [row for row in rows if row[2] not in ("-", "seen in")]
     assert len(rows) > 40 and len(short) == 3
@@ -263,17 +264,15 @@ def test_every_observable_is_on_the_page_on_output():
     assert len(names) > 20 and [name for name in names if f"{name}`" not in known] == []
 
 
-def test_the_script_of_a_recipe_works(tmp_path):
-    page = section("recipes", "## An observable")
-    script = re.search(r'    """The largest speed in time.*?launch\(main\)\n', page, re.DOTALL)[0]
-    (tmp_path / "fastest.py").write_text(textwrap.dedent(script))
-    still = np.zeros((2, 3, 2))
-    command = [sys.executable, "fastest.py", write_run(tmp_path / "run.h5", still, still)]
-    ran(*command, cwd=tmp_path, env=environment(PYTHONPATH=ROOT / "post"), check=True)
-    assert (tmp_path / "fastest.png").exists()
+@pytest.fixture
+def at_work(tmp_path, program, monkeypatch):
+    """Return a new folder that is the working directory, while RICOCHET names the program."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("RICOCHET", str(program))
+    return tmp_path
 
 
-def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
+def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path, monkeypatch):
     lines = section("output", "## Reading it").splitlines()
     code = "\n".join(line[4:] for line in lines if line.startswith("    "))
     assert "from ricochet import read_run" in code and "import h5py" in code
@@ -284,36 +283,36 @@ def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
     for name, periodic in (("gas", (False, False)), ("bulk", (True, True))):
         path = tmp_path / "runs" / f"{name}.h5"
         write_run(path, x, x, observables=energies, periodic=periodic)
-    own = environment(PYTHONPATH=ROOT / "post")
-    ran(sys.executable, "-c", code, cwd=tmp_path, env=own, check=True)
+    monkeypatch.chdir(tmp_path)
+    run_code(code)
     assert (tmp_path / "runs" / "gas.png").exists()
 
 
-def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_path):
+def test_the_code_that_the_page_on_runs_shows_runs_the_program(at_work, program, capfd):
     code = []
     for page, title in (
         ("README", "## In Python"),
-        ("output", "## Running it from Python"),
-        ("output", "## In Python's own process"),
-        ("output", "## Many runs in Python"),
+        ("runs-in-python", "## One run"),
+        ("runs-in-python", "## A simulation in memory"),
+        ("runs-in-python", "## Many runs"),
     ):
         code += re.findall(r"^    (?!build/).*", section(page, title), re.M)
     code.append("    assert box.collisions == 3000")
-    own = environment(PYTHONPATH=ROOT / "post", RICOCHET=program)
-    said = ran(sys.executable, "-c", textwrap.dedent("\n".join(code)), cwd=tmp_path, env=own)
-    assert (said.returncode, said.stderr) == (0, "")
-    energies = [float(line) for line in said.stdout.splitlines()[:3]]
+    run_code(textwrap.dedent("\n".join(code)))
+    said = capfd.readouterr()
+    assert said.err == ""
+    energies = [float(line) for line in said.out.splitlines()[:3]]
     assert len(set(energies)) == 3 and all(0 < energy < 250 for energy in energies)
-    (again,) = re.findall(
-        r"^    build/ricochet (.*)", section("output", "## In Python's own process"), re.M
-    )
-    ran(program, *again.split(), cwd=tmp_path, check=True)
+    memory = section("runs-in-python", "## A simulation in memory")
+    (again,) = re.findall(r"^    build/ricochet (.*)", memory, re.M)
+    ran(program, *again.split(), check=True)
 
 
-def test_the_code_on_time_correlations_of_the_page_on_output_works(program, tmp_path):
-    """The example is executed with a tenth of the disks and a fiftieth of the time.
+@pytest.mark.statistics
+def test_the_code_on_time_correlations_of_the_page_on_output_works(at_work, program, capfd):
+    """The example is executed with two seeds, a tenth of the disks and a fiftieth of the time.
 
-    The start of each of the eight runs is a dense packing, which takes most of the time.
+    The start of each of the four runs is a dense packing, which takes most of the time.
     """
     page = section("output", "## Time correlations and structure")
     blocks = [textwrap.dedent(one) for one in re.findall(r"(?:^    .*\n)+", page, re.M)]
@@ -323,36 +322,33 @@ def test_the_code_on_time_correlations_of_the_page_on_output_works(program, tmp_
         assert old in text
         text = text.replace(old, new)
     for folder in ("input", "runs", "build"):
-        (tmp_path / folder).mkdir()
-    (tmp_path / "input" / "glass.nml").write_text(text)
-    (tmp_path / "build" / "ricochet").symlink_to(program)
-    (tmp_path / "post").symlink_to(ROOT / "post")
-    own = environment(PYTHONPATH=ROOT / "post", RICOCHET=program)
-    shell = blocks[0].replace("python ", f"{sys.executable} ")
-    ran("bash", "-ec", shell, cwd=tmp_path, env=own, check=True)
-    assert "F_s_small,0.78" in (tmp_path / "runs" / "glass.csv").read_text()
+        (at_work / folder).mkdir()
+    (at_work / "input" / "glass.nml").write_text(text)
+    (at_work / "build" / "ricochet").symlink_to(program)
+    (at_work / "post").symlink_to(ROOT / "post")
+    run_shell(blocks[0].replace("\\\n", "").replace("1 2 3 4", "1 2"))
+    assert "F_s_small,0.78" in (at_work / "runs" / "glass.csv").read_text()
     code = "\n".join(blocks[1:]).replace("1000", "50").replace("100, apart", "10, apart")
+    code = code.replace("(1, 2, 3, 4)", "(1, 2)")
     code += "assert msd[0] == 0 and error[5] > 0 and g.y.max() > 3 and memory.done == len(times)"
-    said = ran(sys.executable, "-c", code.replace("until=400", "until=10"), cwd=tmp_path, env=own)
-    assert (said.returncode, said.stderr) == (0, "")
+    capfd.readouterr()
+    run_code(code.replace("until=400", "until=10"))
+    assert capfd.readouterr().err == ""
 
 
-def test_the_code_on_transport_of_the_page_on_output_works(program, tmp_path):
+def test_the_code_on_transport_of_the_page_on_output_works(at_work, capfd):
     """The example is executed with two seeds and a thousandth of the time."""
     page = section("output", "## Transport coefficients")
     blocks = [textwrap.dedent(one) for one in re.findall(r"(?:^    .*\n)+", page, re.M)]
-    (tmp_path / "runs").mkdir()
-    (tmp_path / "input").symlink_to(ROOT / "input")
-    own = environment(PYTHONPATH=ROOT / "post", RICOCHET=program)
+    (at_work / "runs").mkdir()
+    for name in ("input", "post"):
+        (at_work / name).symlink_to(ROOT / name)
     shell = blocks[0].replace("runs/ensemble.sh", str(ROOT / "runs" / "ensemble.sh"))
-    shell = shell.replace("python post", f"{sys.executable} {ROOT}/post")
-    shell = shell.replace("1-4", "1-2").replace("100000", "100")
-    ran("bash", "-ec", shell, cwd=tmp_path, env=own, check=True)
-    assert (tmp_path / "runs" / "carried.csv").read_text().count("conductivity") > 3
+    run_shell(shell.replace("\\\n", "").replace("1-4", "1-2").replace("100000", "100"))
+    assert (at_work / "runs" / "carried.csv").read_text().count("conductivity") > 3
     code = "".join(blocks[1:]).replace(", 3, 4)", ")").replace("2000", "200")
-    code += "assert temperature.shape == (8,)\n"
-    said = ran(sys.executable, "-c", code, cwd=tmp_path, env=own)
-    assert said.returncode == 0 and "mean=" in said.stdout, said.stderr
+    run_code(code + "assert temperature.shape == (8,)\n")
+    assert "mean=" in capfd.readouterr().out
 
 
 def test_there_is_one_version(program):
@@ -414,122 +410,6 @@ def test_completion_knows_ensembles(program, tmp_path):
     assert completed("runs/ensemble.sh", "--sc") == ["--scan"]
     known = 'source "$1"; complete -p ricochet ricochet-ensemble runs/ensemble.sh'
     ran("bash", "-c", known, "bash", COMPLETION, check=True)
-
-
-def replace_lines(name: str, text: str, old: list[str], new: list[str]) -> str:
-    """Replace complete lines of a file, which are found without regard to their indentation."""
-    pattern = "".join(rf"^( *){re.escape(line.strip())}\n" for line in old)
-    places = [*re.finditer(pattern, text, re.MULTILINE)]
-    how = f"{name} contains these lines of a recipe {len(places)} times instead of once"
-    assert len(places) == 1, f"{how}; adapt docs/explanation/recipes.md:\n" + "\n".join(old)
-    (found,) = places
-    lines = [f"{found[1]}{line}\n" if line.strip() else "\n" for line in new]
-    return text[: found.start()] + "".join(lines) + text[found.end() :]
-
-
-def carry_out_recipes(page: str, root: Path) -> int:
-    """Apply the changes of the source code that a page describes: new files and new lines."""
-    for name, code in re.findall(r"`(src/\S+)`, a new file:\n\n((?:    .*\n|\n)+)", page):
-        (root / name).write_text(textwrap.dedent(code).rstrip("\n") + "\n")
-    changes = 0
-    for block in re.findall(r"^```diff\n(.*?)^```", page, re.M | re.S):
-        for name, text in re.findall(r"^--- (\S+)\n(.*?)(?=^--- |\Z)", block, re.M | re.S):
-            for lines in map(str.splitlines, text.split("@@\n")):
-                old = [line[1:] for line in lines if line[0] != "+"]
-                new = [line[1:] for line in lines if line[0] != "-"]
-                file = root / name
-                file.write_text(replace_lines(name, file.read_text(), old, new))
-                changes += 1
-    return changes
-
-
-def test_a_recipe_that_does_not_fit_the_sources_is_named(tmp_path):
-    (tmp_path / "a.f90").write_text("call one()\ncall three()\n")
-    page = "```diff\n--- a.f90\n call one()\n+call two()\n```\n"
-    assert carry_out_recipes(page, tmp_path) == 1
-    with pytest.raises(AssertionError, match=r"a\.f90 contains .* 0 times .*\n *call 1"):
-        carry_out_recipes(page.replace("one", "1"), tmp_path)
-
-
-def look_at_bars(run, folder):
-    """Check the results of the recipe for a bar in Python and in the paths of disks."""
-    ran(*run, "--set", "contact.wall_rule=normal", "--force", cwd=folder, check=True)
-    code = """if True:
-        from ricochet import read_run
-        from ricochet.analysis.paths import seen, turns_between
-        run = read_run("all.h5")
-        assert run.walls.tolist() == [[[1, 0.1], [1, 0.9]]]
-        frames = list(range(0, run.n_frames, 50))
-        turns = turns_between(run, run.event_log(), frames, seen(run, run.event_log(), frames))
-        assert len(turns.time) == (run.event_log()[0] <= run.time[300]).sum() > 200
-    """
-    own = environment(PYTHONPATH=folder / "post")
-    ran(sys.executable, "-c", code, cwd=folder, env=own, check=True)
-    for script, figure in (("player", "all.html"), ("snapshot", "all.png")):
-        command = [sys.executable, folder / f"post/{script}.py", "all.h5", "-o", figure]
-        ran(*command, cwd=folder, env=own, check=True)
-
-
-def test_the_recipes_work(tmp_path):
-    for name in ("src", "post", "Makefile", "tests"):
-        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-        copy(ROOT / name, tmp_path / name)
-    assert carry_out_recipes(path_of("recipes").read_text(), tmp_path) > 30
-    ran("git", "init", "-q", cwd=tmp_path, check=True)
-    said = ran(sys.executable, "tests/support/check_style.py", cwd=tmp_path)
-    assert (said.returncode, said.stdout) == (0, "")
-    build = ["make", "-j2", "OPT=-O0", f"BUILD={tmp_path}/build"]
-    about = "observables", "variables", "namelist_input"
-    laws = " ".join(f"tests/unit/test_{name}.pf" for name in about)
-    for goal in ([], [f"tests={laws}", "unit-tests"]):  # they hold for what is new, too
-        made = ran(*build, *goal, cwd=tmp_path, env=environment())
-        assert made.returncode == 0, made.stdout + made.stderr
-    (tmp_path / "all.nml").write_text(
-        """&box upper = 2, 1 / &run dynamics = 'ideal' /
-        &bar name = 'rod' from = 1, 0.1 to = 1, 0.9 thickness = 0.3 /
-        &species count = 50 radius = 0.02 speed = 1 region = 0, 0.7, 0, 1 /
-        &contact wall_rule = 'sticky' wall_restitution = 1 / &stop time = 3 /
-        &output frames_every_time = 0.01 observables_every_time = 0.01 event_log = .true. /"""
-    )
-    run = [tmp_path / "build" / "ricochet", "all.nml", "-o", "all.h5", "--quiet"]
-    ran(*run, cwd=tmp_path, check=True)
-    with h5py.File(tmp_path / "all.h5") as file:
-        fastest = file["observables/largest_speed/value"][:]
-        x, y = np.moveaxis(file["particles/disks/position/value"][:], -1, 0)
-        assert file["observables/collisions/value"][-1] == 0
-        assert file["observables/obstacle_collisions/value"][-1] > 10
-        assert file["parameters/bar/thickness"][:].tolist() == [0.3]
-    assert np.hypot(x - 1, np.maximum(np.abs(y - 0.5) - 0.4, 0)).min() > 0.17 - 1e-9
-    assert fastest[0] == pytest.approx(1) and (np.diff(fastest) <= 1e-15).all()
-    assert fastest[-1] < 1  # sticky walls take the tangential velocity
-    look_at_bars(run, tmp_path)
-    gas = """&species count = 3000 packing_fraction = 0.3 temperature = 1 /
-        &contact restitution = 1 wall_restitution = 0.5 / &stop wall_hits = 1500 /
-        &side name = 'bottom' elastic_below = 1e9 /
-        &output frames_every_collisions = 10000 observables_every_collisions = 10000 /"""
-    (tmp_path / "gas.nml").write_text(gas)
-    for name, *options in (
-        ("plain",),
-        ("cores", "--set=run.threads=2"),
-        ("parts", "--set=stop.wall_hits=600"),
-        ("parts", "--resume"),
-    ):
-        command = [run[0], "gas.nml", "-o", f"{name}.h5", "--quiet", *options]
-        ran(*command, cwd=tmp_path, check=True)
-    for other in ("cores", "parts"):
-        found = differences(tmp_path / "plain.h5", tmp_path / f"{other}.h5")
-        assert [name for name in found if "parameters" not in name] == []
-    with h5py.File(tmp_path / "plain.h5") as file:
-        exchanged = file["observables/exchanged_impulse/value"][:]
-        hits = file["particles/disks/wall_hits/value"][:]
-        sides = [
-            file[f"observables/sides/{name}/energy_to_disks/value"][-1]
-            for name in ("bottom", "top")
-        ]
-        assert sides[0] == pytest.approx(0, abs=1e-9) and sides[1] < -1  # elastic, and not
-        assert file["observables/side_collisions/value"][-1].sum() == 1500
-        assert exchanged[0] == 0 and exchanged[-1] > 0
-        assert (hits.sum(1) == file["observables/side_collisions/value"][:].sum(1)).all()
 
 
 # --- the notebook: all cells can be executed, and show the results that its text describes ---

@@ -211,6 +211,45 @@ def test_a_driven_gas_does_not_end_for_being_cold(performed):
     assert "note" not in said and "time = 2e16" in said
 
 
+CHIRAL = """&box upper = 100, 100 boundary = 'periodic', 'periodic' /
+&species count = {} radius = 1e-6 temperature = 1 /
+&drive kind = 'active' temperature = 0 interval = {} self_propulsion_speed = {}
+rotational_diffusion = {} turning_rate = {} /
+&stop time = {} / &output frames_every_time = {} /
+"""
+
+
+def test_chiral_disks_move_on_circles(run_of):
+    """Without diffusion and heat the path of a disk is a regular polygon, counter-clockwise."""
+    interval, speed, rate = 0.1, 1.5, 2 * np.pi / 5
+    run = run_of(CHIRAL.format(3, interval, speed, 0, rate, 10.1, interval))
+    r = run.unwrapped(slice(1, None))
+    assert r[50:] == pytest.approx(r[:-50], abs=1e-9)
+    middle = r[:50].mean(0)
+    radius = speed * interval / (2 * np.sin(rate * interval / 2))
+    arm = r - middle
+    assert np.linalg.norm(arm, axis=-1) == pytest.approx(radius, abs=1e-9)
+    assert (arm[:-1, :, 0] * arm[1:, :, 1] > arm[:-1, :, 1] * arm[1:, :, 0]).all()
+
+
+def test_chiral_disks_spread_as_predicted(run_of):
+    """The mean square displacement is that of n flights in directions u_1 ... u_n.
+
+    <u_i u_j> is the real part of q^|i - j| with q = exp((i rate - diffusion) interval).
+    """
+    interval, speed, diffusion, rate = 0.1, 1.5, 0.3, -0.8
+    run = run_of(CHIRAL.format(1000, interval, speed, diffusion, rate, 100, 1))
+    r = run.unwrapped(slice(1, None))
+    q = np.exp((1j * rate - diffusion) * interval)
+    for lag in (1, 3, 10):
+        n = round(lag / interval)
+        apart = np.arange(1, n)
+        together = n + 2 * ((n - apart) * q**apart).sum().real
+        measured = ((r[lag:] - r[:-lag]) ** 2).sum(-1).mean()
+        error = np.sqrt(2 * max(lag, 1 / diffusion) / r[:, :, 0].size)
+        assert measured == pytest.approx((speed * interval) ** 2 * together, rel=4 * error)
+
+
 # --- recycling: disks that jump from one region to another ---
 
 FALLING = """&run seed = 4 /

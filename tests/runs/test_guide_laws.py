@@ -8,12 +8,13 @@ import pytest
 from synthetic_run import ROOT
 
 
-def carried_out(guide, heading):
-    """Execute the Python examples of a section of a guide; return their variables."""
+def carried_out(guide, *headings):
+    """Execute the Python examples of sections of a guide; return their variables."""
     text = (ROOT / "docs" / "guides" / f"{guide}.md").read_text()
-    section = text.partition(f"\n{heading}\n")[2].partition("\n## ")[0]
     variables: dict = {}
-    exec("".join(re.findall(r"```python\n(.*?)```", section, re.S)), variables)
+    for heading in headings:
+        section = text.partition(f"\n{heading}\n")[2].partition("\n## ")[0]
+        exec("".join(re.findall(r"```python\n(.*?)```", section, re.S)), variables)
     return variables
 
 
@@ -49,3 +50,22 @@ def test_the_event_log_of_a_stadium_contains_its_lyapunov_exponent(monkeypatch):
     log = found["log"]
     assert abs(found["growth"] / (log.time[-1] - log.time[0]) - 0.43) < 0.02
     assert abs(found["path"].mean - found["expected"]) < 5 * found["path"].error < 0.1
+
+
+def test_the_poincare_section_of_a_chaotic_billiard_is_covered_uniformly():
+    """The area dx dv_x of the section is invariant: its means have 20 % more than shot noise."""
+    found = carried_out("functions-of-events", "## A Poincaré section")
+    x, v = found["section"].T
+    assert len(x) >= 2000 and x.min() >= 0.01 and x.max() <= 0.99
+    assert x.mean() == pytest.approx(0.5, abs=0.04)
+    assert (v**2).mean() == pytest.approx(1 / 3, abs=0.04)
+    counts = np.histogram2d(x, v, bins=4, range=[[0.01, 0.99], [-1, 1]])[0]
+    assert counts.min() > 0.6 * len(x) / 16 and counts.max() < 1.4 * len(x) / 16
+
+
+def test_a_simulation_stops_exactly_when_a_disk_enters_a_region():
+    headings = "## A stop at a chosen event", "## A stop when a disk enters a region"
+    found = carried_out("functions-of-events", *headings)
+    arrivals = found["arrivals"]
+    assert len(set(arrivals)) == 20 and max(arrivals) < 1000
+    assert np.mean(arrivals) < np.mean(found["times"])  # the strip is before the side

@@ -134,7 +134,10 @@ def test_values_in_all_their_spellings_are_printed(ricochet, tmp_path, seed):
     text, written = rng.choice(["", "\ufeff"]), []
     for group in rng.sample(sorted(table.keys() - {"contact"}), rng.randint(1, 5)):
         names = table[group].keys() - ({"name"} if group != "side" else set())
-        values = {name: drawn(rng, table[group][name]) for name in rng.sample(sorted(names), 4)}
+        values = {
+            name: drawn(rng, table[group][name])
+            for name in rng.sample(sorted(names), min(4, len(names)))
+        }
         text += "&" + rng.choice([group, group.upper()]) + rng.choice(SPACES)
         for name, value in values.items():
             parts = [(name, value)]
@@ -171,7 +174,7 @@ def test_the_table_says_what_may_change_on_resuming(ricochet):
     found = {f"{g}.{v}" for g, rows in table.items() for v, row in rows.items() if row["resumable"]}
     timed = [f"output.{v}" for v in table["output"] if re.match("(frames|observables)_", v)]
     run = [f"run.{v}" for v in ("title", "search", "queue", "threads")]
-    stop = [f"stop.{v}" for v in table["stop"]]
+    stop = [f"{g}.{v}" for g in ("change", "stop") for v in table[g]]
     assert found == {*run, *stop, *timed, "output.decades_from", "output.checkpoint_every"}
     words = "may change on --resume"
     assert words in ricochet("--explain", "stop.time").stdout
@@ -358,6 +361,7 @@ def test_wrong_usage_is_one_line(ricochet, command):
 def test_the_limits_that_are_printed_are_those_that_hold(ricochet, checked):
     """No variable is refused as out of range if its value is within the printed limits."""
     instance = {"species": ".gas", "obstacle": ".pin", "wall": ".ramp", "side": ".top"}
+    instance |= {"change": ".1", "source": ".tap"}
     numbers = [
         (group, name, row)
         for group, variables in json.loads(ricochet("--print-variables").stdout).items()
@@ -373,7 +377,9 @@ def test_the_limits_that_are_printed_are_those_that_hold(ricochet, checked):
             number = round(value) if whole else value
             setting = f"{group}{instance.get(group, '')}.{name}="
             setting += ",".join([repr(number)] * (row["size"] or 2))
-            run = checked(GOOD + OTHERS, "--quiet", "--set", setting)
+            text = GOOD + OTHERS + "&change time = 1 set = 'contact.restitution=0.5' /\n"
+            text += "&source name = 'tap' interval = 1 temperature = 1 /\n"
+            run = checked(text, "--quiet", "--set", setting)
             lines = lines_of(run)
             assert run.returncode == (USAGE if lines else 0), setting
             inside = row["above"] is None or number > row["above"]

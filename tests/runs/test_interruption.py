@@ -147,6 +147,27 @@ def test_progress_stays_on_one_line_of_the_terminal(program, tmp_path, text, sho
     assert line.startswith(f"\r\x1b[K{last}")
 
 
+@pytest.mark.parametrize("gravity", [-0.1, 0])
+def test_the_line_says_that_bounces_on_walls_slow_a_run_down(program, tmp_path, gravity):
+    """Kicks start the bounces of disks on the floor anew; without gravity there are none."""
+    write_input(
+        tmp_path,
+        f"""&box upper = 90, 1 gravity = 0, {gravity} / &run seed = 1 /
+        &contact wall_restitution = 0.6 restitution_law = 'viscoelastic' reference_speed = 0.1 /
+        &species count = 40 radius = 0.01 speed = 0.01 /
+        &drive kind = 'noise' interval = 0.01 strength = 1e-3 / &stop wall_clock = 60 /""",
+    )
+    why, said, lines = "slow: disks bounce on walls, which contact.contact_time prevents", False, 0
+
+    def enough():
+        return said or (gravity == 0 and lines >= 5)
+
+    for line in shown_until_stopped(program, tmp_path, enough):
+        said = said or why in line
+        lines += 1
+    assert said == (gravity < 0)
+
+
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGINT", "SIGHUP", "SIGXCPU"])
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_signal_stops_the_run_with_a_checkpoint(started, tmp_path, name, times):

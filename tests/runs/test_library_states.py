@@ -19,7 +19,7 @@ from ricochet import EventLog, Simulation
 from ricochet.running.simulation import NEVER
 from ricochet.running.state import COLUMNS as ALL_COLUMNS
 
-COLUMNS = [name for name in ALL_COLUMNS if name != "recycled"]  # the gas is not driven
+COLUMNS = [name for name in ALL_COLUMNS if name not in ("recycled", "present")]  # a closed gas
 
 
 def test_a_simulation_shows_what_the_file_of_its_run_has(whole):

@@ -109,7 +109,11 @@ def test_a_file_that_declares_absurdly_many_disks_is_refused_at_once(ricochet, t
     small = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_AS, (2**28, 2**28))}
     run = ricochet("gas.nml", "--check", seconds=2, **small)
     assert run.returncode == FILES and len(run.stderr.splitlines()) == 1
-    reason = "or a smaller starting file" if count == 10**8 else "its number of disks is not valid"
+    reason = (
+        "or a smaller initial-configuration file"
+        if count == 10**8
+        else "its number of disks is not valid"
+    )
     assert reason in run.stderr
 
 
@@ -139,7 +143,8 @@ placement = 'lattice' velocities = 'maxwell' /
     [
         (490_000, 2, ()),
         (490_000, 2, ("box.boundary=periodic,periodic", "output.frames_every_collisions=490000")),
-        (1_000_000, 6, ()),  # shorter runs do not use domains
+        # shorter runs do not use domains
+        pytest.param(1_000_000, 6, (), marks=pytest.mark.statistics),
         pytest.param(10_000_000, 6, (), marks=pytest.mark.check),
     ],
 )
@@ -147,7 +152,8 @@ def test_a_run_takes_the_memory_that_is_assumed(memory_of, ricochet, count, leng
     """The memory of the disks agrees with the estimate in runs with and without domains.
 
     The memory of a run of 100 disks is subtracted from both, because the libraries of one system
-    need twice as much memory as those of another.
+    need twice as much memory as those of another.  The run of 10^6 disks, the smallest with
+    domains, uses 6 s.
     """
     measured, assumed = [], []
     for disks in (count, 100):
@@ -212,7 +218,7 @@ def test_a_million_disks_need_no_stack(limited, words):
 
 def test_a_long_input_needs_no_stack(limited, monkeypatch):
     """The input consists of three megabytes of comments and walls."""
-    walls = "".join(f"&wall from = 0.1, {k}e-4 to = 0.9, {k}e-4 /\n" for k in range(1, 5000))
+    walls = "".join(f"&wall from = 0.1, {k}e-4 to = 0.9, {k}e-4 /\n" for k in range(1, 2000))
     text = GAS.replace("count = {count}", "count = {count} region = 0, 1, 0.6, 1")
     monkeypatch.setitem(globals(), "GAS", text + walls + "! and so on\n" * 230_000)
     run = limited(10, stack=256 * 1024, collisions=5)

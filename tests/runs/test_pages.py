@@ -10,16 +10,20 @@ A comment `<!-- test: OLD => NEW; OLD => NEW -->` before a block replaces texts 
 that a long run becomes a short one.  The comment `<!-- test: not run, REASON -->` excludes a block.
 """
 
+import contextlib
+import itertools
 import os
 import re
+import shlex
 import shutil
 import sys
 from pathlib import Path
 from typing import NamedTuple
+from unittest import mock
 
 import pytest
 
-from synthetic_run import ROOT
+from synthetic_run import ROOT, run_code, run_script
 from whole_runs import environment, ran
 
 BLOCK = re.compile(
@@ -27,9 +31,23 @@ BLOCK = re.compile(
 )
 #: The first line of a block that is written to a file, by language.
 FIRST_LINE = {"fortran": r"! (runs/[\w-]+\.nml)\b", "c": r"// (runs/[\w-]+\.c)\b"}
+#: A command that runs a script of post/.
+SCRIPT = re.compile(r"(?:\.venv/bin/)?python post/(\w+)\.py(.*)")
 LANGUAGES = {"bash", "python", "fortran", "text", "diff", "mermaid", "c"}
 PAGES = [path for path in sorted(ROOT.glob("docs/*/*.md")) if "```" in path.read_text()]
 RUN = [path for path in PAGES if path.parent.name in ("tutorials", "guides")]
+#: Pages whose code takes most of the time, because it simulates and draws a dozen runs.
+LONG = {
+    "billiards",
+    "contact-networks",
+    "cooling-and-driving",
+    "dense-states",
+    "exam",
+    "functions-of-events",
+    "gravity",
+    "hard-spheres-lab",
+    "transport",
+}
 
 
 class Block(NamedTuple):
@@ -75,28 +93,46 @@ def make_project(folder: Path, program: Path) -> None:
         (folder / name).symlink_to(ROOT / name)
 
 
+def run_shell(code: str) -> None:
+    """Execute shell commands; scripts run in this process, which has loaded their packages.
+
+    A block with loops or variables is executed by bash as a whole.
+    """
+    lines = [code] if re.search(r"^ +\w|\$|<<", code, re.M) else code.splitlines()
+    for line in lines:
+        if script := SCRIPT.match(line):
+            words = shlex.split(script[2], comments=True)
+            named = [sorted(Path().glob(word)) or [word] for word in words]
+            assert run_script(script[1], *itertools.chain(*named)) == 0, line
+        else:
+            shell = re.sub(r"(?m)^( *)(?:\.venv/bin/)?python ", rf"\1{sys.executable} ", line)
+            own = environment(PYTHON=sys.executable, PYTHONPATH=ROOT / "post", MPLBACKEND="Agg")
+            ran("bash", "-ec", shell, env=own, check=True)
+
+
 def execute(blocks: list[Block], folder: Path, program: Path) -> None:
     """Execute blocks in a folder that looks like the project."""
-    own = environment(
-        PYTHON=sys.executable, RICOCHET=program, PYTHONPATH=ROOT / "post", MPLBACKEND="Agg"
-    )
     code = ""
-    for block in blocks:
-        if block.language in FIRST_LINE:
-            name = re.match(FIRST_LINE[block.language], block.code)
-            assert name, f"the first line names no file: {block.code.splitlines()[0]}"
-            (folder / name[1]).write_text(block.code)
-        elif block.language == "bash":
-            shell = re.sub(r"(?m)^( *)(?:\.venv/bin/)?python ", rf"\1{sys.executable} ", block.code)
-            ran("bash", "-ec", shell, cwd=folder, env=own, check=True)
-        elif block.language == "python":
-            code += block.code
-    if code:
-        said = ran(sys.executable, "-W", "error::UserWarning", "-c", code, cwd=folder, env=own)
-        assert said.returncode == 0, said.stderr
+    with contextlib.chdir(folder), mock.patch.dict(os.environ, RICOCHET=str(program)):
+        for block in blocks:
+            if block.language in FIRST_LINE:
+                name = re.match(FIRST_LINE[block.language], block.code)
+                assert name, f"the first line names no file: {block.code.splitlines()[0]}"
+                Path(name[1]).write_text(block.code)
+            elif block.language == "bash":
+                run_shell(block.code.replace("\\\n", ""))
+            elif block.language == "python":
+                code += block.code
+        run_code(code)
 
 
-@pytest.mark.parametrize("page", RUN, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def marked(page: Path):
+    """Return a parameter of a test; the mark excludes a long page from `make test`."""
+    name = f"{page.parent.name}/{page.stem}"
+    return pytest.param(page, id=name, marks=[pytest.mark.statistics] * (page.stem in LONG))
+
+
+@pytest.mark.parametrize("page", [*map(marked, RUN)])
 def test_the_code_of_a_page_works(page, program, tmp_path):
     """The longest pages use about ten seconds, because they simulate and draw a dozen runs."""
     text = page.read_text()

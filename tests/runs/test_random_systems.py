@@ -35,6 +35,7 @@ from whole_runs import BROKEN, FINISHED, PATIENCE, STOPPED
 from whole_runs import contents, executable, ran, unlike, within
 
 SEEDS = [f"{os.environ.get('SEED', '1')} {k}" for k in range(int(os.environ.get("SYSTEMS", "60")))]
+KEPT = 20  #: number of systems in `make test`
 SECONDS = 200  # of processor time, which only endless runs exceed
 PARTS = 5
 BYTES = os.environ.get("BYTES", "4000000000")  # of address space
@@ -42,7 +43,9 @@ LATEST = 1e100  # that an input can name
 KILLED = (STOPPED, -signal.SIGTERM, -signal.SIGKILL)
 NOT_THE_END = ("placing disks:", "warning:", "note:", "stopped; the run is finished")
 #: Message for systems whose disks do not fit into the box.
-NO_ROOM = re.compile(r"(species\.(radius|placement|file|position)|drive\.to_region): ")
+NO_ROOM = re.compile(
+    r"(species\.(radius|placement|file|position)|drive\.to_region|source\.region): "
+)
 #: Data about the execution of a run, which may differ between runs with equal results.
 ASIDE = re.compile(
     r"^/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every|/stop@wall_clock)$"
@@ -220,14 +223,21 @@ def rescaled(line: str, units: dict, table: dict) -> str:
     """Return a group of the input in other units; relative sizes are dimensionless."""
     group = re.match(r"&?(\w*)", line)[1]
 
-    def value(match: re.Match) -> str:
-        unit = table[group].get(match[1], {}).get("unit")
-        if not unit or ("relative_to" in line and match[1] in ("radius", "mass")):
-            return match[0]
+    def scaled(group: str, name: str, words: str) -> str:
+        unit = table[group].get(name, {}).get("unit")
+        if not unit or ("relative_to" in line and name in ("radius", "mass")):
+            return words
         factor = eval(unit, {}, units)
-        return f"{match[1]} = {numbers(*(factor * float(word) for word in match[2].split(',')))}"
+        return numbers(*(factor * float(word) for word in words.split(",")))
 
-    return re.sub(r"(\w+) = (-?\d[-+.\de]*(?:, -?\d[-+.\de]*)*)", value, line)
+    def value(match: re.Match) -> str:
+        return f"{match[1]} = {scaled(group, *match.groups())}"
+
+    def setting(match: re.Match) -> str:
+        return f"'{match[1]}{match[2]}{match[3]}={scaled(match[1], match[3], match[4])}'"
+
+    line = re.sub(r"(\w+) = (-?\d[-+.\de]*(?:, -?\d[-+.\de]*)*)", value, line)
+    return re.sub(r"'(\w+)([\w.]*\.)(\w+)=(-?\d[^']*)'", setting, line)  # of a change
 
 
 def end_of(process: subprocess.Popen) -> End:
@@ -241,7 +251,7 @@ def end_of(process: subprocess.Popen) -> End:
     return End(process.returncode, lines[-1] if lines else "")
 
 
-def accepted(program: Path, folder: Path, rng: random.Random, **options: int) -> System:
+def accepted(program: Path, folder: Path, rng: random.Random, **options: int | bool) -> System:
     """Return the first system that the program accepts, with its files."""
     for _ in range(20):
         system = random_system(rng, **options)
@@ -317,7 +327,17 @@ def faults(program: Path, folder: Path, seed: str) -> str:
     return "\n".join([*said, case.system.text]) if said else ""
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+def first_kept(seeds: list[str], kept: int) -> list:
+    """Return parameters of a test; those beyond the first are tested in `.ci/run`.
+
+    All are tested if the variable SYSTEMS sets their number.
+    """
+    kept = len(seeds) if "SYSTEMS" in os.environ else kept
+    more = (pytest.param(seed, marks=pytest.mark.statistics) for seed in seeds[kept:])
+    return [*seeds[:kept], *more]
+
+
+@pytest.mark.parametrize("seed", first_kept(SEEDS, KEPT))
 def test_all_ways_end_alike_and_the_laws_hold(program, tmp_path, seed):
     assert not (said := faults(program, tmp_path, seed)), said
 
@@ -331,6 +351,9 @@ NOT_DRAWN |= {"wall.file"}
 #: Pairs of features that the program refuses, or that a random system cannot combine.
 APART = [
     ("box.shear_rate", r"obstacle|wall|side|box\.gravity|run\.d|stop\.energy"),
+    (r"source|species\.waiting|side\.open|stop\.disks", r"box\.shear|stop\.energy|output\.helf"),
+    ("source", r"drive\.(kind = recycle|from_region|to_region|velocity)"),
+    ("species.waiting", r"species\.(file|position)"),
     (
         r"stop\.(energy|at_rest)",
         r"drive|box\.shear|(side|wall|obstacle)\.(temp|surf)|side\.[aefmpv]|side\.start",

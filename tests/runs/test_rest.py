@@ -80,6 +80,41 @@ def test_a_disk_that_rests_while_another_moves_breaks_the_run_off(ricochet, tmp_
     assert run.returncode == FINISHED and "note" not in run.stdout
 
 
+@pytest.mark.parametrize("rest", [".true.", ".false."])
+def test_a_disk_that_rests_beside_a_moving_one_ends_a_run_alike_whatever_stops_it(
+    ricochet, tmp_path, rest
+):
+    """The last event gives the message of the last time; a disk that still bounces gives none."""
+    write_input(tmp_path, PAIR.format(height=1.3))
+    at_rest = f"--set=stop.at_rest={rest}"
+    by_time = ricochet(*COMMAND, at_rest, "--set=stop.time=9")
+    by_events = ricochet(*COMMAND, at_rest, "--set=stop.events=200", "--force")
+    said = by_events.stderr.splitlines()[-1]
+    assert by_events.returncode == BROKEN and "disk 1 (ball) and the bottom side" in said
+    assert by_time.returncode == BROKEN and said.split(" at ")[0] in by_time.stderr
+    run = ricochet(*COMMAND, at_rest, "--set=stop.events=20", "--force")
+    assert run.returncode == FINISHED and "note" not in run.stdout
+    pair = Simulation(tmp_path / "gas.nml", {"stop.at_rest": False, "stop.events": 1000})
+    pair.advance(events=20)
+    with pytest.raises(ProgramError, match="time no longer advances"):
+        pair.advance(events=180)
+
+
+def test_the_next_collision_of_a_falling_row_is_with_a_disk_and_not_with_a_side(program, tmp_path):
+    """A run ends between collisions that take no time.  A library with run-time checks is used."""
+    write_input(
+        tmp_path,
+        """&box lower = -9, -9 upper = 9, 9 gravity = 0, -1e-3 /
+        &species count = 3 radius = 0.1 position = -1, 0, 0.1, 0, 1.3, 0
+          velocity = 1, 0, 0, 0, -1, 0 /
+        &contact restitution = 0.02 / &stop events = 100 /""",
+    )
+    row = Simulation(tmp_path / "gas.nml")
+    for events in range(1, 31):
+        row.advance(events=events)
+        assert row.events == events
+
+
 def test_without_gravity_disks_are_at_rest_when_none_moves(ricochet, tmp_path):
     write_input(
         tmp_path,

@@ -4,8 +4,8 @@ import h5py
 import numpy as np
 import pytest
 
-import player
 from ricochet import read_run, write_start
+from ricochet.figures.film_data import radii_of
 from synthetic_run import run_script
 from whole_runs import FILES, FINISHED, STOPPED, USAGE, differences, one_line, write_input
 
@@ -216,7 +216,7 @@ def test_numbers_in_a_damaged_run_are_refused(ricochet, tmp_path, bed, damage, s
 def test_scripts_see_each_disk_and_refuse_laws_of_equal_ones(ricochet, tmp_path, bed, capsys):
     finished(ricochet, "gas.h5")
     run = read_run(tmp_path / "gas.h5")
-    radii, own = player.radii_of(run)
+    radii, own = radii_of(run)
     assert (radii[own] == by_species(bed)["radius"]).all()
     assert run_script("mixture", run.path, "-o", tmp_path / "mixture.png") == 1
     message = capsys.readouterr().err

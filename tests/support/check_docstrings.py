@@ -19,6 +19,7 @@ MODULES = (
     "structure",
     "correlations",
     "hard_disks",
+    "mixtures",
     "theory",
     "crater",
     "speeds",

@@ -41,6 +41,8 @@ def examples_of(page: str) -> list[str]:
     found: list[str] = []
     for section in re.split(r"^#+ ", page, flags=re.MULTILINE):
         code = "\n".join(blocks_of(section))
+        if re.search(r"^from \.", code, re.MULTILINE):
+            continue  # a module of the package, which a test of the recipes adds to it
         if re.search(r"^(import|from) ", code, re.MULTILINE):
             found.append(code)
         elif code and found:

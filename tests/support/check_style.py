@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 MOST_LINES_OF_FILE = 600
 MOST_LINES_OF_PROCEDURE = 60
+MOST_LINES_WITHOUT_COMMENT = 9
 MOST_ARGUMENTS = 7
 MOST_FILES_OF_FOLDER = 15
 CODE = {".F90", ".c", ".f90", ".js", ".pf", ".py", ".sh"}
@@ -194,11 +195,14 @@ def statements_of(text: str) -> list[tuple[int, str]]:
 
 
 def heading_problems(path: Path, text: str) -> Iterator[Problem]:
-    """Return procedures without a comment or an empty line before them, or with many arguments.
+    """Return procedures that lack a comment or an empty line, or have too many arguments.
 
-    Interfaces of C functions need no comment, because manual pages describe these functions.
+    Interfaces of C functions need no comment, because manual pages describe these functions. Nor
+    does a private procedure of less than ten lines whose name says everything.
     """
     statements = statements_of(text)
+    offered = public_names(statements)
+    ends = [number for number, statement in statements if END.match(statement)]
     foreign = declared = inside = False
     before = ""
     for number, statement in statements:
@@ -207,7 +211,9 @@ def heading_problems(path: Path, text: str) -> Iterator[Problem]:
         elif (procedure := PROCEDURE.match(statement)) and not END.match(statement):
             name, words = procedure[1], statement[procedure.end() :].split(")")[0]
             count = len([word for word in words.split(",") if word.strip()])
-            if not foreign and not before.startswith("!>"):
+            length = next((end for end in ends if end > number), number) - number + 1
+            is_small = name not in offered and length <= MOST_LINES_WITHOUT_COMMENT
+            if not foreign and not before.startswith("!>") and not is_small:
                 yield Problem(path, number, f"{name} has no !> before it")
             if not foreign and count > MOST_ARGUMENTS:
                 yield Problem(path, number, f"{name} has {count} arguments, not {MOST_ARGUMENTS}")
@@ -219,6 +225,16 @@ def heading_problems(path: Path, text: str) -> Iterator[Problem]:
                 yield Problem(path, number, f"{name}: no blank line before the body")
             inside = False
         before = statement
+
+
+def public_names(statements: list[tuple[int, str]]) -> set[str]:
+    """Return the public names of a module, including the public bindings of its types."""
+    names: set[str] = set()
+    for _, statement in statements:
+        kind, colons, listed = statement.partition("::")
+        if colons and re.match(r"(?:public|procedure)\b", kind) and "private" not in kind:
+            names.update(re.findall(r"\w+", listed))
+    return names
 
 
 def name_problems(root: Path, paths: list[Path]) -> Iterator[Problem]:
@@ -293,7 +309,7 @@ def comments_of(path: Path) -> Iterator[tuple[int, str]]:
 
 def language_problems(root: Path) -> Iterator[Problem]:
     """Return help texts that do not begin with a noun, badly begun sentences, and denied words."""
-    for path in sorted((root / "src" / "variables").glob("*.f90")):
+    for path in sorted((root / "src").glob("*/*.f90")):
         text = path.read_text()
         for row in HELP.finditer(text):
             if row[3] in NO_NOUN or not row[3][:1].isupper():

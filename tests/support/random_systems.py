@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from random_openings import Openings
+
 MOST_EVENTS, MOST_OF_FEW = 40_000, 12_000  #: one or two epochs for many disks
 SIDES = ("left", "right", "bottom", "top")
 CADENCES = ("time", "collisions", "events", "collisions_per_disk")
@@ -417,7 +419,8 @@ class Draw:
             self.drifts = True  # or all disks come to rest
         if self.least or self.chance(0.2):
             self.drifts = True  # events become rarer, so that the last one may require a long time
-            words += f" restitution_law = '{'viscoelastic' if self.least else 'power'}'"
+            law = "viscoelastic" if self.least else rng.choice(["power", "elastic_below"])
+            words += f" restitution_law = '{law}'"
             words += f" reference_speed = {self.speed * 10.0 ** rng.uniform(-2, 1)!r}"
         if self.turns or self.chance(0.5):
             words += " wall_rule = 'normal'"
@@ -443,6 +446,7 @@ class Draw:
             interval = self.step * rng.randint(1, 5)  # events occur at the ends of steps
         energy = self.speed**2 * 10.0 ** rng.uniform(-2, 1)
         turn = self.maybe(0.7, f"rotational_diffusion = {rng.choice([0.1, 10]) / flight!r}")
+        turn += f" turning_rate = {-1 / flight!r}" if turn else ""
         words = rng.choice(
             [
                 f"kind = 'noise' strength = {energy / flight!r}"
@@ -495,9 +499,9 @@ class Draw:
                 words += self.maybe(0.9, " at_rest = .true.")
         if self.chance(0.3) or self.steps or self.driven or self.drifts or self.disks < 4:
             words += f" time = {rng.uniform(0.01, 1) * min(self.edges) / self.speed!r}"
-        elif max(self.edges) > 30 * min(self.edges):
-            # Events are so rare that the samples until the last event would fill the disk.
-            words += f" time = {100 * min(self.edges) / self.speed!r}"
+        else:  # if events become rare, the samples until the last event would fill the disk
+            far = 100 if max(self.edges) > 30 * min(self.edges) else 1000
+            words += f" time = {far * min(self.edges) / self.speed!r}"
         return words + " /"
 
     def output(self) -> str:
@@ -538,8 +542,11 @@ class Draw:
         return every
 
 
-def random_system(rng: random.Random, most: int = 10**6) -> System:
-    """Return a random system of at most about `most` disks, which the program may refuse."""
+def random_system(rng: random.Random, most: int = 10**6, openings: bool = True) -> System:
+    """Return a random system of at most about `most` disks, which the program may refuse.
+
+    Without `openings` the system has no open sides, sources, waiting disks and scheduled changes.
+    """
     draw = Draw(rng, most)
     walls = draw.sides()
     obstacles = draw.obstacles()
@@ -549,6 +556,9 @@ def random_system(rng: random.Random, most: int = 10**6) -> System:
     if alone:  # the momentum of a single driven disk is its velocity: only a free one is driven
         parts[-1] = parts[-1].replace("keep_momentum = .true.", "keep_momentum = .false.")
     parts += [draw.stop(), draw.output()]
+    draw.openings = Openings(draw, [part for part in parts if part])
+    if openings:
+        parts = draw.openings.all_parts()
     table = draw.table[:, : len(draw.columns)]
     text = "\n".join(parts) + "\n"
     return System(text, draw.columns, table, draw.disks, draw.events, draw)

@@ -10,12 +10,16 @@ export OMP_WAIT_POLICY=passive
 shift 2
 expected=$(cat "$@" | grep -ciE '^[[:space:]]*@test[[:space:]]*$')
 . "$(dirname "$0")/../../src/progress.sh"
+# The file has no name any more, since a trap that removes it could also run in the background process of `announce`, if this process
+# ends before it has reset the traps.
 log=$(mktemp)
-trap 'rm -f "$log"' EXIT
-run() { (ulimit -S -c 0 -t "$limit" && timeout "${hours}h" "$program" >"$log" 2>&1); }
+exec 3>"$log"
+exec 4<"$log"
+rm "$log"
+run() { (ulimit -S -c 0 -t "$limit" && timeout "${hours}h" "$program" >&3 2>&1); }
 status=0
 announce "$expected unit tests under $runner" run || status=$?
-output=$(<"$log")
+output=$(cat <&4)
 printf '%s\n' "$output"
 case $status in
   124) echo "unit tests: stopped after $hours hours" >&2 ;;

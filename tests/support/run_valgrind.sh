@@ -33,6 +33,9 @@ watched 0 "$inputs/gravity.nml" -o gravity.h5 "${few[@]}"
 watched 0 "$inputs/gravity_steps.nml" -o steps.h5 --set stop.time=0.5
 watched 0 "$inputs/lorentz.nml" -o lorentz.h5 "${few[@]}"
 watched 0 "$inputs/bulk.nml" -o dense.h5 "${few[@]}" --set species.disks.placement=dense --set species.disks.count=100
+for driven in heated active hopper; do
+  watched 0 "$inputs/$driven.nml" -o "$driven.h5" "${few[@]}" --set stop.time=1 --set run.threads=2
+done
 watched 75 "$inputs/cooling.nml" -o stopped.h5 --set stop.wall_clock=0.01
 watched 75 "$inputs/cooling.nml" -o stopped.h5 --set stop.wall_clock=0.01 --resume
 watched 0 --explain species

@@ -2,6 +2,8 @@
 
 import os
 import re
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -14,7 +16,7 @@ sys.path.insert(0, str(SUPPORT))
 from check_style import problems_of  # noqa: E402
 from translate_pf import Refused, translate  # noqa: E402
 
-from whole_runs import environment, executable, ran  # noqa: E402
+from whole_runs import environment, executable, ran, with_parent  # noqa: E402
 
 RUNNERS = ["", os.environ["PFUNIT_DIR"]] if os.environ.get("PFUNIT_DIR") else [""]
 FILE = """module test_it
@@ -274,7 +276,6 @@ def test_a_submodule_is_a_file_of_its_name_that_needs_no_private(tmp_path):
         ("module upper", "module uppermost", 1, "instead of upper"),
         ("    twice = 2*x*value\n", "    twice = 2*x*value\n" * 59, 9, "longer than 60 lines"),
         ("function twice", "function get_twice", 9, "says nothing"),
-        ("  !> Twice.\n", "", 8, "no !> before it"),
         ("twice(x)", "twice(x, a, b, c, d, e, f, g)", 9, "8 arguments"),
         ("in) :: x\n\n", "in) :: x\n", 11, "no blank line before the body"),
         ("2*x*value", "2*x", 3, "value is imported, not used"),
@@ -292,6 +293,17 @@ def test_a_style_problem_is_reported_at_its_line(tmp_path, before, after, line, 
     (problem,) = style_problems(tmp_path, MODULE.replace(before, after, 1))
     assert problem.startswith(f"src/high/upper.f90:{line}: ")
     assert words in problem
+
+
+@pytest.mark.parametrize(("lines", "is_public", "expected"), [(9, 0, 0), (10, 0, 1), (9, 1, 2)])
+def test_only_small_private_procedures_need_no_comment(tmp_path, lines, is_public, expected):
+    """A public one has a second problem here, because nobody uses it."""
+    text = MODULE.replace("  !> Twice.\n", "")
+    text = text.replace("    twice = 2", "    twice = 1\n" * (lines - 5) + "    twice = 2")
+    text = text.replace("private\n", "private\n  public :: twice\n" if is_public else "private\n")
+    problems = style_problems(tmp_path, text)
+    assert len(problems) == expected
+    assert any("no !> before it" in problem for problem in problems) == (expected > 0)
 
 
 def test_words_of_python_pages_and_helps_are_looked_at(tmp_path):
@@ -371,3 +383,14 @@ def test_imports_of_the_package_are_those_of_its_picture(tmp_path, line, used):
     assert problem.startswith(f"post/ricochet/pages/lab.py:{where}: pages imports {used}")
     (problem,) = problems("  pages --> reading & commands & lost")
     assert problem == "post/ricochet/README.md:1: there is no lost in the package"
+
+
+@pytest.mark.skipif(not shutil.which("setpriv"), reason="no setpriv (util-linux)")
+def test_a_process_ends_with_its_parent_even_if_that_is_killed():
+    child = "import time; print('lives', flush=True); time.sleep(20); print('lives on')"
+    parent = "import subprocess, sys; subprocess.run(sys.argv[1:])"
+    command = [sys.executable, "-c", parent, *with_parent(sys.executable, "-c", child)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "lives\n"
+        process.kill()
+        assert process.stdout.read() == ""

@@ -13,9 +13,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 WIDTH = 120
 FOLDERS = ("docs", "src", "input", "runs", "post")
-#: Pages that are not wrapped: scripts write them, or (output, exam) they would exceed 400 lines.
+#: Pages that are not wrapped, because scripts write them.
 EXCEPT = re.compile(
-    r"docs/(reference/(input|input/\w+|inputs|c|command-line|output)|tutorials/exam"
+    r"docs/(reference/(input|input/\w+|inputs|c|command-line)"
     r"|explanation/validation)\.md"
 )
 ITEM = re.compile(r"( *)([-*+]|\d+[.)]) +(?=\S)")
@@ -27,7 +27,10 @@ BEGINS = re.compile(r"([-*+]|\d+[.)]|#+|=+|-+|[|>].*|\$\$.*|<.*|:::.*)$")
 
 def pages() -> list[Path]:
     """Return the pages that are wrapped."""
-    found = [path for name in FOLDERS for path in (ROOT / name).rglob("*.md")]
+    found = [
+        *ROOT.glob("*.md"),
+        *(path for name in FOLDERS for path in (ROOT / name).rglob("*.md")),
+    ]
     return [path for path in sorted(found) if not EXCEPT.fullmatch(f"{path.relative_to(ROOT)}")]
 
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from ricochet import Run, hard_disks as hd
 from ricochet.analysis.cooling import energy_left, exponent, soft_law
+from ricochet.mixtures import cooling_ratio
 
 from .case import AT_LEAST, AT_MOST, EXACT, Case, Member, relative, sigmas, within
 from .estimators import at_collisions, each, over
 from .inputs import PERIODIC, disk, gases, light_and_heavy, namelist
-from .laws import cooling_ratio
 
 # --- gases of one species ---
 

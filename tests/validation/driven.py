@@ -4,7 +4,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from ricochet import Run, hard_disks as hd
+from ricochet import Run, hard_disks as hd, mixtures
 from ricochet.analysis.statistics import Estimate, combine_runs, goodness_of_fit
 from ricochet.analysis.equilibrium import start_of_equilibrium
 from ricochet.analysis.transport import MOMENTS, of_moments
@@ -108,7 +108,7 @@ def flowing(eta: float, size: float, mass: float) -> tuple[Member, ...]:
     """Return gases of two equally numerous species; the first has the diameter and mass 1."""
     edge = sqrt(FLOWING * pi / 8 * (1 + size**2) / eta)
     own = np.full(2, FLOWING / 2 / edge**2), np.array([1, size]), np.array([1, mass])
-    memory = hd.enskog_mixture(hd.henderson(eta), *own)["memory"]
+    memory = mixtures.enskog_mixture(hd.henderson(eta), *own)["memory"]
     half = {"count": FLOWING // 2, "temperature": 1.0, "exact_temperature": 1.0}
     return ensemble(
         8,

@@ -3,9 +3,8 @@
 import math
 
 import numpy as np
-from scipy.optimize import brentq
 
-from ricochet import hard_disks as hd
+from ricochet import hard_disks as hd, mixtures
 
 
 def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:
@@ -14,26 +13,7 @@ def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:
     pair = (s[:, None] + s) / 2
     reduced = 2 * math.pi * kt * (1 / m[:, None] + 1 / m)
     z = float(hd.simulated(math.pi / 4 * np.sum(n * s**2)))
-    return n * pair * hd.contact_values(z, n, s) * np.sqrt(reduced)
-
-
-def cooling_ratio(mass_ratio: float, xi: float, share: float = 0.5) -> float:
-    """Return T_heavy / T_light of a dilute cooling mixture of disks of equal size.
-
-    Both species cool at the same rate; rates with Maxwellian velocities as in Garzo and Dufty,
-    Phys. Rev. E 60, 5706 (1999), here in two dimensions.  `share` is the fraction of heavy disks.
-    """
-    mass, part = np.array([1.0, mass_ratio]), np.array([1 - share, share])
-
-    def difference(ratio: float) -> float:
-        square = np.array([1.0, ratio]) / mass  # kT / m
-        opposite = mass / (mass[:, None] + mass)  # m_j / (m_i + m_j)
-        total = square[:, None] + square
-        gain = 1 - opposite * (1 + xi) / 2 * total / square[:, None]
-        rates = np.sum(part * opposite * np.sqrt(total) * gain, axis=1)
-        return rates[1] - rates[0]
-
-    return float(brentq(difference, 0.1, 10.0, xtol=1e-13))
+    return n * pair * mixtures.contact_values(z, n, s) * np.sqrt(reduced)
 
 
 def noise_kurtosis(xi: float) -> float:

@@ -4,8 +4,8 @@ from math import acos, pi, sin, sqrt
 
 import numpy as np
 
-from driven import fuller, share
 from ricochet import Run
+from ricochet.analysis.driven import fuller, share
 from ricochet.analysis.statistics import Estimate, combine_runs, correlated_mean
 from ricochet.predictions.hard_disks import adiabat
 from ricochet.predictions.theory import demon_share, pushed_width

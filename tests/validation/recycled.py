@@ -4,8 +4,8 @@ from math import pi, sqrt
 
 import numpy as np
 
-from discharge import EXPONENT, fitted, rate, reduced_width, reduction
 from ricochet import Run
+from ricochet.reports.grains.discharge import EXPONENT, fitted, rate, reduced_width, reduction
 
 from .case import Case, Member, sigmas, within
 from .estimators import over
