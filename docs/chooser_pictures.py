@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
@@ -37,6 +38,17 @@ def digest(path: Path, at: float) -> str:
     return hashlib.sha256("\n".join([*filter(None, lines), repr(float(at))]).encode()).hexdigest()
 
 
+def draw_sides(axes: Axes, room: np.ndarray, sides: list[dict]) -> None:
+    """Draw the sides of a box with the corners `room` (2, 2), except those that are open."""
+    (x0, y0), (x1, y1) = room
+    if not any(side.get("open") for side in sides):
+        axes.add_patch(Rectangle(room[0], x1 - x0, y1 - y0, fill=False, color="0.3", lw=0.8))
+        return
+    lines = [[(x, y0), (x, y1)] for x in (x0, x1)] + [[(x0, y), (x1, y)] for y in (y0, y1)]
+    shut = [line for line, side in zip(lines, sides, strict=True) if not side.get("open")]
+    axes.add_collection(LineCollection(shut, color="0.3", lw=0.8, capstyle="projecting"))
+
+
 def picture(path: Path, at: float) -> bytes:
     """Return a PNG picture of the disks at the given time."""
     from ricochet import Simulation
@@ -56,7 +68,7 @@ def picture(path: Path, at: float) -> bytes:
             if (place := f"sides/{side}/position") in run.observables:
                 room[k % 2, k // 2] = run.observable(place)
         axes.add_patch(Rectangle(lower, *(upper - lower), fill=False, color="0.8", lw=0.8))
-        axes.add_patch(Rectangle(room[0], *(room[1] - room[0]), fill=False, color="0.3", lw=0.8))
+        draw_sides(axes, room, [run.parameters.get("side", {}).get(k, {}) for k in SIDES])
         for one in obstacles_of(run.parameters):
             if one.is_arc:
                 axes.plot(*one.points(181).T, color="0.3", lw=0.8)
@@ -65,8 +77,9 @@ def picture(path: Path, at: float) -> bytes:
             axes.add_patch(Circle(one.centre, one.radius, facecolor=colour, edgecolor="0.3"))
         walls = walls_of(run.parameters)
         axes.add_collection(LineCollection(walls, color="0.3", lw=0.8))
+        inside = np.isfinite(run.position[:, 0])  # others are outside of an open box
         least = min(0.006, 0.2 / np.sqrt(run.n_disks)) * np.max(upper - lower)
-        size = 2 * np.maximum(run.radius, least)
+        size = 2 * np.maximum(run.radius, least)[inside]
         colours = [SPECIES[(k - 1) % len(SPECIES)] for k in run.species]
         if run.n_disks <= FEW:
             way = np.array(way)
@@ -77,9 +90,14 @@ def picture(path: Path, at: float) -> bytes:
             for k in range(run.n_disks):
                 axes.plot(*way[:, k].T, color=colours[k], lw=0.6)
         circles = EllipseCollection(
-            size, size, 0 * size, units="xy", offsets=run.position, offset_transform=axes.transData
+            size,
+            size,
+            0 * size,
+            units="xy",
+            offsets=run.position[inside],
+            offset_transform=axes.transData,
         )
-        circles.set(facecolor=colours, edgecolor="none")
+        circles.set(facecolor=np.array(colours)[inside], edgecolor="none")
         axes.add_collection(circles)
     axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), aspect="equal")
     axes.set_axis_off()

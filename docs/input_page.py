@@ -17,35 +17,40 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = "docs/reference/input"
 LAW = "Collision rules of boundaries"
 GROUPS = {
-    "run": "The group contains the seed, the method and the number of threads of the run.",
-    "box": "The group contains the size of the box, its boundaries, gravity and shear "
+    "run": "The group `&run` sets the seed, the method and the number of threads.",
+    "box": "The group `&box` sets the size of the box, its boundaries, gravity and shear "
     "([theory](../../explanation/theory.md#sheared-boxes)).",
-    "side": "The group describes a side of the box that is a wall, with its motion "
-    "([theory](../../explanation/theory.md#sides-that-move)). Each group describes one side. The "
-    "collision rule of a side is described under [boundaries](boundaries.md).",
-    "obstacle": "The group describes a circular obstacle or an arc, or many of them from a file, "
-    "and may be repeated. The collision rule of an obstacle is described under "
+    "side": "A group `&side` describes the motion of one side of the box that is a wall "
+    "([theory](../../explanation/theory.md#sides-that-move)). Its collision rule is described "
+    "under [boundaries](boundaries.md).",
+    "obstacle": "A group `&obstacle` describes a circular obstacle or an arc, or many of them from "
+    "a file, and may be repeated. Its collision rule is described under "
     "[boundaries](boundaries.md).",
-    "wall": "The group describes a straight wall, a polyline, or many walls from a file, and may "
-    "be repeated. Disks bounce off both faces of a wall and off its end points. The collision rule "
-    "of a wall is described under [boundaries](boundaries.md).",
-    LAW: "Each group `&side`, `&obstacle` and `&wall` may contain these variables, which describe "
-    "the collisions of disks with one boundary. For a boundary without these variables, the "
-    "`wall_...` variables of [`&contact`](contact.md) apply.",
-    "species": "The group describes disks of one kind. It is repeated for each species, and an "
-    "input file contains at least one such group "
-    "([starting states](../../explanation/theory.md#starting-states)).",
-    "contact": "The group contains the collision rules of disks, and of boundaries that have no "
-    "rule of their own ([theory](../../explanation/theory.md#contact)).",
-    "drive": "The group describes driving, which changes velocities at fixed intervals "
+    "wall": "A group `&wall` describes a straight wall, a polyline, or many walls from a file, and "
+    "may be repeated. Disks bounce off both faces of a wall and off its end points. Its collision "
+    "rule is described under [boundaries](boundaries.md).",
+    LAW: "The groups `&side`, `&obstacle` and `&wall` share these variables, which describe the "
+    "collisions of disks with one boundary. A boundary without them has the `wall_...` variables "
+    "of [`&contact`](contact.md).",
+    "species": "A group `&species` describes disks of one kind. It is repeated for each species, "
+    "and an input file needs at least one "
+    "([initial configurations](../../explanation/theory.md#starting-states)).",
+    "contact": "The group `&contact` sets the collision rules of disks, and of boundaries without "
+    "rules of their own ([theory](../../explanation/theory.md#contact)).",
+    "drive": "The group `&drive` describes driving, which changes velocities at fixed intervals "
     "([theory](../../explanation/theory.md#kicks)).",
-    "stop": "The group contains the rules that end the run. The run ends when the first of these "
-    "rules is met, and at least one rule is needed. If no further event can occur and no `time` is "
-    "given, the run ends at the last collision, or at the sample that is due after it.",
-    "output": "The group determines the contents of the output file, and the times of frames and "
-    "samples. The initial and the final state are always written. Averages over samples at "
-    "intervals of collisions or events differ from averages over time by a relative amount of "
-    "order 1/N ([output](../output.md#observables)).",
+    "source": "A group `&source` lets waiting disks enter the box at regular times, and may be "
+    "repeated. Disks wait from the start (`waiting` of [`&species`](species.md)), or after they "
+    "have left the box through an open side (`open` of [`&side`](side.md)).",
+    "change": "A group `&change` describes a change of the system at a given time, and may be "
+    "repeated ([changes during a run](../../guides/changes.md)).",
+    "stop": "The group `&stop` sets the rules that end the run, of which at least one is needed. "
+    "The run ends when the first of them is met. If no further event can occur and no `time` is "
+    "given, it ends at the last collision, or at the sample that is due after it.",
+    "output": "The group `&output` determines the contents of the output file, and the times of "
+    "frames and samples. The initial and the final state are always written. Averages over samples "
+    "at intervals of collisions or events differ from time averages by a relative amount of order "
+    "1/N ([output](../output.md#observables)).",
 }
 #: Input file from which the example of each group is taken.
 EXAMPLES = {
@@ -58,6 +63,8 @@ EXAMPLES = {
     "species": "crater",
     "contact": "rough",
     "drive": "active",
+    "source": "pump",
+    "change": "quench",
     "stop": "scattering",
     "output": "mixture",
 }
@@ -65,9 +72,9 @@ EXAMPLES = {
 HEAD = """\
 # Input: every variable
 
-This page is the reference for all variables of an input file, for everybody who writes one.
+For everybody who writes an input file, these pages list all its variables.
 [input/README](../../input/README.md) explains the rules of the format and shows how to describe a
-system; [input/reference.nml](../../input/reference.nml) is a file with all variables. The command
+system; [input/reference.nml](../../input/reference.nml) contains all variables. The command
 `ricochet --explain VARIABLE` prints the same text for one variable, and `--explain WORD` searches
 names, choices and explanations. `docs/input_page.py` generates these pages from the table in the
 program.
@@ -75,15 +82,18 @@ program.
 A file consists of groups `&name ... /` with lines `variable = value`. Only values that differ from
 the default are needed. On the command line `--set GROUP.VARIABLE=VALUE` replaces a value. A
 species, an obstacle or a wall is addressed by its name, as in `--set species.projectile.mass=50`,
-and one element of a vector by its number, as in `--set 'box.gravity(2)=-5'`. The file chooses the
-units of length, time and mass ([units](../explanation/glossary.md#units)).
+and one element of a vector by its number, as in `--set 'box.gravity(2)=-5'`. The input file
+determines the units of length, time and mass ([units](../explanation/glossary.md#units)).
 
-A table for each variable lists the allowed values with their unit, the default, and an example if
-the variable has no default. The row *applies with* names the choice of another variable for which
-the variable has an effect. The row *excludes* names variables that cannot be given together with
-it. The row *may change* exists for two kinds of variables: variables without an effect on the
-trajectory may change when a run is continued with `--resume`, and some others may change while a
-simulation runs (in Python and on the laboratory page). All other variables are fixed during a run.
+For each variable a table lists the allowed values with their unit, the default, and an example if
+there is no default. Three more rows appear where they apply:
+
+- *applies with*: the choice of another variable that is required for this variable to have an
+  effect;
+- *excludes*: variables that cannot be combined with this one;
+- *may change*: on `--resume` (variables without an effect on the trajectory), or while a
+  simulation runs (by `&change`, in Python and on the laboratory page). All other variables are
+  fixed during a run.
 
 ## Groups
 
@@ -202,9 +212,7 @@ def linked(name: str, group: str) -> str:
 
 def group_page(group: str, entries: dict[str, dict]) -> str:
     """Return the text of the page about a group of input variables."""
-    subject = "collision rules of boundaries" if group == LAW else f"the group `&{group}`"
-    purpose = f"This page is the reference for {subject}, for everybody who writes an input file."
-    lines = [f"# {title_of(group)}", "", f"{purpose} {GROUPS[group]}", "", *example_of(group)]
+    lines = [f"# {title_of(group)}", "", GROUPS[group], "", *example_of(group)]
     lines += ["## Variables", "", "| variable | default |", "|---|---|"]
     for name, entry in entries.items():
         default = f"`{written(entry)}`" if entry["default"] is not None else ""

@@ -3,9 +3,11 @@
 python docs/reference_pages.py build/ricochet
 
 The script writes docs/reference/c.md from the header src/ricochet.h, docs/reference/inputs.md from
-the input files and input/chooser.json, and the help text in docs/reference/command-line.md.
+the input files and input/chooser.json, the help text in docs/reference/command-line.md, and the
+tables of analyses and other scripts in docs/reference/scripts.md.
 """
 
+import ast
 import json
 import re
 import subprocess
@@ -122,12 +124,30 @@ def command_page(program: Path) -> str:
     return f"{before}{start}```text\n{said.strip()}\n```\n<!-- end -->{end}"
 
 
+def scripts_page() -> str:
+    """Return the page on the scripts, with the present tables of analyses and other scripts."""
+    page = (ROOT / "docs/reference/scripts.md").read_text(encoding="utf-8")
+    sys.path.insert(0, str(ROOT / "post"))
+    from ricochet import analyses
+
+    others = [path for path in sorted((ROOT / "post").glob("*.py")) if path.stem not in analyses]
+    lines = {path.stem: ast.get_docstring(ast.parse(path.read_text())) for path in others}
+    whole = page[: page.index("## Analyses")]
+    for title, rows in (("Analyses", analyses), ("Other scripts", lines)):
+        whole += f"## {title}\n\n| script | purpose |\n|---|---|\n"
+        for name, text in rows.items():
+            whole += f"| `{name}.py` | {text.splitlines()[0].rstrip('.')} |\n"
+        whole += "\n"
+    return whole.rstrip("\n") + "\n"
+
+
 def pages(program: Path) -> dict[str, str]:
     """Return a dictionary from the path of each page to its text."""
     return {
         "docs/reference/c.md": c_page(),
         "docs/reference/inputs.md": inputs_page(),
         "docs/reference/command-line.md": command_page(program),
+        "docs/reference/scripts.md": scripts_page(),
     }
 
 

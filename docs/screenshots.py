@@ -1,6 +1,6 @@
 """Take the screenshots of the laboratory (the interactive web page) for the tutorials.
 
-    python docs/screenshots.py
+    python docs/screenshots.py [NAME...]
 
 The script starts the laboratory, opens it in headless Chromium, and writes pictures to
 docs/tutorials.  The script needs the program and its library (`make all library`), Chromium and
@@ -20,8 +20,16 @@ sys.path[:0] = [str(DOCS), str(DOCS.parent / "tests"), str(DOCS.parent / "post")
 from browser import browsing  # noqa: E402
 from page_figures import reduced  # noqa: E402
 
-#: Input of each screenshot, and the duration of the simulation before the screenshot [s].
-PICTURES = {"laboratory": ("mixture", 8), "laboratory_crater": ("crater", 20)}
+#: Input of each screenshot, and the time of the simulation at the screenshot.
+PICTURES = {
+    "laboratory": ("mixture", 1.5),
+    "laboratory_crater": ("crater", 0.48),
+    "laboratory_collision": ("collision", 0),
+    "laboratory_pump": ("pump", 17),
+}
+#: Time that the film shows, or -1 before the first picture.
+TIME = """const { film, moment } = filmOf(current()).inside?.() ?? {};
+    return film ? moment.time : -1"""
 
 
 def address_of(lab: subprocess.Popen) -> str:
@@ -33,6 +41,7 @@ def address_of(lab: subprocess.Popen) -> str:
 
 
 def main() -> None:
+    wanted = sys.argv[1:] or [*PICTURES]
     command = [sys.executable, DOCS.parent / "post" / "lab.py", "--no-open"]
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -43,10 +52,13 @@ def main() -> None:
         try:
             address = address_of(lab).split("#")[0]
             with browsing(Path(folder), (1400, 900)) as browser:
-                for name, (given, seconds) in PICTURES.items():
+                for name in wanted:
+                    given, when = PICTURES[name]
                     browser.open("about:blank")
                     browser.open(f"{address}#input={given}")
-                    time.sleep(seconds)
+                    while browser.run(TIME) < when:
+                        time.sleep(0.1)
+                    browser.draw(3)
                     data = base64.b64decode(browser.call("GET", "/screenshot"))
                     picture = Path(folder) / f"{name}.png"
                     picture.write_bytes(data)

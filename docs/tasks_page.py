@@ -43,17 +43,16 @@ with smooth walls (ξ = 0.8, eight seeds).
 - *Mass.* The number of hit grains grows with the mass of the projectile to the power {hit_mass}.
 - *Speed.* The number of hit grains grows with the speed to the power {hit_speed}. The crater does
   not depend on the speed.
-- *Radius.* In a sufficiently large bed the crater becomes slowly smaller with the radius of the
-  projectile: with 5000 grains 1043, 951 and 905 grains are hit for the radii 2, 5 and 10. In a
-  smaller bed the crater becomes larger with the radius, because a small projectile reaches the
-  floor and loses its energy there: with 1000 grains 537, 610 and 663 grains are hit. The figure
-  shows 2000 grains only; its open points, at which the floor affects the crater, rise for this
-  reason.
-- *Size of the bed.* A bed of about 7.5 M (1/f - 1)/(1 - ξ²) grains is sufficiently large, where M
-  is the ratio of the masses and f the fraction of the energy that is left at the end. For the
-  values of this problem the estimate is 2250 grains. The bed of 2000 grains is slightly smaller.
-  It is acceptable for these values, because fewer than 20 collisions with walls occur, which is the
-  limit up to which the scripts include a crater in the fit (filled symbols).
+- *Radius.* In a sufficiently large bed the crater shrinks slowly with the radius of the projectile:
+  of 5000 grains 1043, 951 and 905 are hit for the radii 2, 5 and 10. In a smaller bed it grows with
+  the radius, because a small projectile reaches the floor and loses its energy there: of 1000
+  grains 537, 610 and 663 are hit. The figure shows only beds of 2000 grains. At its open points the
+  projectile loses energy at the floor in the same way, so that the crater grows with the radius.
+- *Size of the bed.* About 7.5 M (1/f - 1)/(1 - ξ²) grains are needed, where M is the mass ratio and
+  f the fraction of the energy that is left at the end. Here the estimate is 2250 grains. The
+  slightly smaller bed of 2000 grains is acceptable for these values, because fewer than 20
+  collisions with walls occur, the limit up to which the scripts include a crater in the fit (filled
+  symbols).
 - *Restitution.* As ξ approaches 1 the crater grows to the whole bed.
 """,
     "energy": """\
@@ -63,14 +62,14 @@ formula gives {expected_0.001}, {expected_0.002} and {expected_0.004} % (32 pair
 s).
 """,
     "equipartition": """\
-The mean energies of both species agree within 10 % from ({T_first}) s on for the earliest of the
-four v₀, and from ({T_last}) s on for the latest. The time hardly depends on v₀.
+For the earliest of the four v₀, the mean energies of both species agree within 10 % from
+({T_first}) s on, and for the latest from ({T_last}) s on. The time hardly depends on v₀.
 """,
     "laws": """\
-Relative to the exponential laws, the measured slopes of seed 1 are {speed_A} and {speed_B} for v²
-of the species A and B, and {height_A} and {height_B} for their heights. The dashed lines are the
-laws for 60 disks of finite size with a fixed energy. Their slopes are {speed_law} for v², and
-{height_law_A} and {height_law_B} for the heights.
+The slopes measured with seed 1, divided by those of the exponential laws, are {speed_A} and
+{speed_B} for v² of the species A and B, and {height_A} and {height_B} for their heights. The dashed
+lines are the laws for 60 disks of finite size with a fixed energy, whose slopes are {speed_law} for
+v², and {height_law_A} and {height_law_B} for the heights.
 """,
 }
 
