@@ -1,5 +1,5 @@
-!> Error values. An allocated `error_t` indicates a failure. A procedure that fails returns it to
-!> its caller, and `main` finally prints the message.
+!> Error handling. A procedure that fails returns an allocated `error_t` to its caller; the error is
+!> passed up to `main`, which prints the message.
 module errors
   use texts, only: legible
   implicit none
@@ -8,23 +8,27 @@ module errors
   public :: exit_finished, exit_usage, exit_files, exit_broken, exit_stopped
 
   integer, parameter :: exit_finished = 0   !! exit status of a run that reached its stop rule
-  integer, parameter :: exit_usage = 2      !! exit status after wrong usage, invalid input, or a checkpoint of another run
-  integer, parameter :: exit_files = 3      !! exit status if a file cannot be read or written or is in use
-  !> Exit status of a simulation that was aborted because events no longer advanced the time, disks
-  !> overlapped, or a number became NaN.
+  !> Exit status after wrong usage, invalid input, or an attempt to resume another run's checkpoint.
+  integer, parameter :: exit_usage = 2
+  integer, parameter :: exit_files = 3      !! exit status if a file is in use or cannot be read or written
+  !> Exit status of an aborted simulation: events no longer advanced the time, disks overlapped, or
+  !> a number became NaN.
   integer, parameter :: exit_broken = 4
-  integer, parameter :: exit_stopped = 75   !! exit status of a run stopped by a signal or the wall-clock limit, with a checkpoint
+  !> Exit status of a run that wrote a checkpoint and stopped, at a signal or at its wall-clock
+  !> limit.
+  integer, parameter :: exit_stopped = 75
 
-  !> A failure: its message and the exit status of the program.
+  !> Error message and exit status of the program.
   type :: error_t
-    character(len=:), allocatable :: message   !! cause, location and remedy of the failure; one line per problem
+    !> Cause, location and remedy, with one line for each problem.
+    character(len=:), allocatable :: message
     integer :: code = exit_usage               !! exit status of the program
   end type error_t
 
 contains
 
-  !> Allocates `error` with an exit status and a message. Control characters are replaced, so that
-  !> the message remains one legible line even if a name from the input contains some.
+  !> Allocates an error with the given exit status and message. Control characters, which a name
+  !> from the input may contain, are replaced, so that the message stays legible and on one line.
   pure subroutine fail(error, code, message)
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in) :: code                !! one of the `exit_` constants

@@ -1,12 +1,12 @@
-!> Settings that a type reads itself: in one sequence of calls the type names the variables of its
-!> input group, each with the component that receives the value.
+!> Self-describing settings: a type lists the variables of its input group in one sequence of calls,
+!> each with the component that stores the value.
 module fields
   use kinds, only: int64, real64
   implicit none
   private
   public :: fields_t
 
-  !> The variables of one group of the input.
+  !> Variables of one input group.
   type, abstract :: fields_t
   contains
     generic :: read => read_real, read_reals, read_pairs, read_integer, read_integers, read_logical
@@ -22,8 +22,7 @@ module fields
 
   abstract interface
 
-    !> Stores the value of a variable. If the variable has no value, the component keeps its
-    !> default.
+    !> Stores the value of a variable; an unset variable leaves the default in the component.
     subroutine read_real(self, name, value)
       import :: fields_t, real64
       class(fields_t), intent(inout) :: self
@@ -31,7 +30,7 @@ module fields
       real(real64), intent(inout) :: value
     end subroutine read_real
 
-    !> Stores the values of a variable, as `read_real`.
+    !> Array version of `read_real`.
     subroutine read_reals(self, name, values)
       import :: fields_t, real64
       class(fields_t), intent(inout) :: self
@@ -39,8 +38,8 @@ module fields
       real(real64), intent(inout) :: values(:)
     end subroutine read_reals
 
-    !> Stores a list x1, y1, x2, y2, ... of any length; the shape is (2,0) if the variable has no
-    !> value.
+    !> Stores a list x1, y1, x2, y2, ... of any length. An unset variable gives an array of shape
+    !> (2,0).
     subroutine read_pairs(self, name, pairs)
       import :: fields_t, real64
       class(fields_t), intent(inout) :: self
@@ -48,7 +47,7 @@ module fields
       real(real64), allocatable, intent(out) :: pairs(:, :)      !! (2,n)
     end subroutine read_pairs
 
-    !> Stores an integer, as `read_real`.
+    !> Integer version of `read_real`.
     subroutine read_integer(self, name, value)
       import :: fields_t, int64
       class(fields_t), intent(inout) :: self
@@ -56,7 +55,7 @@ module fields
       integer(int64), intent(inout) :: value
     end subroutine read_integer
 
-    !> Stores several integers, as `read_real`.
+    !> Integer-array version of `read_real`.
     subroutine read_integers(self, name, values)
       import :: fields_t
       class(fields_t), intent(inout) :: self
@@ -64,7 +63,7 @@ module fields
       integer, intent(inout) :: values(:)
     end subroutine read_integers
 
-    !> Stores a logical value, as `read_real`.
+    !> Logical version of `read_real`.
     subroutine read_logical(self, name, value)
       import :: fields_t
       class(fields_t), intent(inout) :: self
@@ -72,7 +71,7 @@ module fields
       logical, intent(inout) :: value
     end subroutine read_logical
 
-    !> Whether the user has set a variable to a valid value.
+    !> True if the user has set the variable and its value is valid.
     function is_sound(self, name) result(yes)
       import :: fields_t
       class(fields_t), intent(in) :: self
@@ -80,12 +79,12 @@ module fields
       logical :: yes
     end function is_sound
 
-    !> Reports a problem of a variable.
+    !> Reports an invalid value of a variable.
     subroutine complain(self, name, what)
       import :: fields_t
       class(fields_t), intent(inout) :: self
       character(len=*), intent(in) :: name
-      character(len=*), intent(in) :: what        !! the problem and the allowed values
+      character(len=*), intent(in) :: what        !! the problem, and the allowed values
     end subroutine complain
   end interface
 

@@ -1,4 +1,4 @@
-!> Kind parameters of Fortran numbers, and the time that represents "no event".
+!> Kind parameters of Fortran numbers, and the time `never`.
 module kinds
   use, intrinsic :: iso_fortran_env, only: int16, int32, int64, real64
   implicit none
@@ -7,10 +7,10 @@ module kinds
 
   integer, parameter :: int128 = selected_int_kind(38)
 
-  !> Time that represents "no event", later than any event. It is finite, because sums and products
-  !> that contain infinity could be NaN.
+  !> Time of an event that does not occur, later than any actual event. It is finite, because sums
+  !> and products with infinity could be NaN.
   real(real64), parameter :: never = 1.0e150_real64
-  !> 2**53: double-precision numbers represent every integer up to this value exactly.
+  !> Largest integer up to which double precision represents all integers exactly.
   real(real64), parameter :: largest_exact = 2.0_real64**53
   real(real64), parameter :: pi = 3.14159265358979323846264338327950288_real64
 end module kinds

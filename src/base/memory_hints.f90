@@ -1,13 +1,13 @@
-!> Prefetch hints, which Fortran cannot express. They affect only the speed of a run, never its
-!> results. The code that depends on the compiler and the operating system is in `memory_hints.c`;
-!> without the macro `MEMORY_HINTS`, a prefetch has no effect.
+!> Prefetch hints, which Fortran cannot express. They change the speed of a run but never its
+!> results. The C file `memory_hints.c` contains the code that depends on compiler and operating
+!> system; if the macro `MEMORY_HINTS` is undefined, a prefetch does nothing.
 module memory_hints
   use, intrinsic :: iso_c_binding, only: c_double, c_int32_t
   implicit none
   private
   public :: prefetch
 
-  !> Starts to load the cache line of a variable for a later read, and returns without waiting for the data.
+  !> Starts loading the cache line of a variable for a later read, without waiting for the data.
   interface prefetch
     subroutine prefetch_integer(item) bind(C)
       import :: c_int32_t

@@ -1,24 +1,23 @@
 !> Reproducible random numbers from the generator xoshiro256** (Blackman and Vigna, 2021,
-!> doi:10.1145/3460772), seeded by SplitMix64 (Steele, Lea and Flood, 2014,
-!> doi:10.1145/2660193.2660195), so that the streams of consecutive seeds are unrelated. A copy of a
+!> doi:10.1145/3460772). The generator is seeded by SplitMix64 (Steele, Lea and Flood, 2014,
+!> doi:10.1145/2660193.2660195), so that consecutive seeds give unrelated streams. A copy of a
 !> random stream yields the same numbers as the original.
 !>
 !> Both generators use unsigned arithmetic modulo 2**64. Fortran has no unsigned integers and does
-!> not allow overflow of signed ones, so sums and products modulo 2**64 are calculated with longer
-!> integers.
+!> not allow signed integers to overflow, so sums and products modulo 2**64 are calculated in
+!> 128-bit integers.
 module random_stream
   use kinds, only: int32, int64, int128, real64
   implicit none
   private
   public :: key_of_draws, random_stream_t
 
-  !> Purposes for which random numbers are drawn during a run. Random numbers for the initial state
-  !> are drawn from other streams.
+  !> Purposes of random numbers during a run. The initial state uses other streams.
   integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5, recycled_disks = 6, entering_disks = 7
 
   real(real64), parameter :: unit_53 = 2.0_real64**(-53)
 
-  !> A random stream: the state of a generator xoshiro256**.
+  !> State of one xoshiro256** generator.
   type :: random_stream_t
     integer(int64) :: word(4) = 0_int64         !! state; at least one word is nonzero after seeding
   contains
@@ -51,18 +50,18 @@ contains
   end subroutine seed
 
   !> Starts a separate random stream for a single draw during a run. Its numbers depend only on the
-  !> arguments, not on the order of the draws or on the thread.
+  !> arguments, and not on the thread or on earlier draws.
   pure subroutine seed_draw(self, number, purpose, id, count)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: number        !! seed from the input
-    integer, intent(in) :: purpose              !! purpose of the draw, one of the constants above such as `thermal_walls`
+    integer, intent(in) :: purpose              !! such as `thermal_walls`; one of the constants above
     integer(int32), intent(in) :: id            !! id of the disk
-    integer(int64), intent(in) :: count         !! number of the draw, or of the event that requires the draw
+    integer(int64), intent(in) :: count      !! index of the draw, or of the event that needs random numbers
 
     call self%seed_disk(key_of_draws(number, purpose), id, count)
   end subroutine seed_draw
 
-  !> Part of the key of a random stream that does not depend on the disk, for `seed_disk`.
+  !> Part of the key of `seed_draw` that is common to all disks.
   pure function key_of_draws(number, purpose) result(key)
     integer(int64), intent(in) :: number        !! seed from the input
     integer, intent(in) :: purpose              !! as in `seed_draw`
@@ -73,8 +72,7 @@ contains
     call draw_seed(state, key)
   end function key_of_draws
 
-  !> Version of `seed_draw` for callers that have already calculated the part of the key that does
-  !> not depend on the disk.
+  !> Version of `seed_draw` for callers that reuse the part of the key common to all disks.
   pure subroutine seed_disk(self, key, id, count)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: key           !! from `key_of_draws`
@@ -88,7 +86,7 @@ contains
     call fill(self, state)
   end subroutine seed_disk
 
-  !> Mixes one element of a key into the state of SplitMix64, which seeds a random stream.
+  !> Mixes one element of a key into the state of SplitMix64.
   pure subroutine add_key(state, part)
     integer(int64), intent(inout) :: state
     integer, intent(in) :: part
@@ -109,7 +107,7 @@ contains
     end do
   end subroutine fill
 
-  !> Draws the next 64 random bits.
+  !> Returns the next 64 random bits.
   pure subroutine draw_word(self, word)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(out) :: word
@@ -134,7 +132,7 @@ contains
     s(4) = ishftc(s(4), 45)
   end subroutine step
 
-  !> Draws a number that is uniformly distributed in [0, 1).
+  !> Draws a number uniformly distributed in [0, 1).
   pure subroutine draw_uniform(self, u)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: u
@@ -144,7 +142,7 @@ contains
     u = uniform(word)
   end subroutine draw_uniform
 
-  !> Draws an integer that is uniformly distributed from 1 to n.
+  !> Draws an integer uniformly distributed from 1 to n.
   pure subroutine draw_index(self, n, k)
     class(random_stream_t), intent(inout) :: self
     integer(int32), intent(in) :: n             !! > 0
@@ -155,9 +153,8 @@ contains
     k = 1 + int(n*u, int32)
   end subroutine draw_index
 
-  !> Draws a unit vector of random direction by normalising a random point of the unit disk. Sine
-  !> and cosine are avoided, because the last bits of their results depend on the mathematical
-  !> library.
+  !> Draws a unit vector in a random direction by normalising a random point of the unit disk. Sine
+  !> and cosine are avoided, because their last bits depend on the mathematical library.
   pure subroutine draw_direction(self, e)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: e(2)
@@ -167,9 +164,9 @@ contains
     e = e/sqrt(s)
   end subroutine draw_direction
 
-  !> Draws two independent Gaussian random numbers of mean 0 and variance 1 by the polar method
-  !> (Marsaglia and Bray, 1964, doi:10.1137/1006063). Because of the logarithm, their last bit may
-  !> depend on the mathematical library.
+  !> Draws two independent Gaussian random numbers of zero mean and unit variance by the polar
+  !> method (Marsaglia and Bray, 1964, doi:10.1137/1006063). Their last bits may depend on the
+  !> mathematical library, which computes the logarithm.
   pure subroutine draw_normals(self, z)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: z(2)
@@ -179,14 +176,14 @@ contains
     z = z*sqrt(-2*log(s)/s)
   end subroutine draw_normals
 
-  !> Draws a uniformly distributed point of the unit disk, except its centre, and returns its
-  !> squared distance from the centre.
+  !> Draws a uniformly distributed point of the unit disk without its centre, and returns the
+  !> squared distance of the point from the centre.
   pure subroutine draw_in_disk(stream, point, s)
     class(random_stream_t), intent(inout) :: stream
     real(real64), intent(out) :: point(2), s
     integer(int64) :: state(4), word(2)
 
-    state = stream%word                         ! local copy of the state, which the compiler can keep in registers
+    state = stream%word                         ! a local copy can stay in registers
     do
       call step(state, word(1))
       call step(state, word(2))
@@ -197,7 +194,7 @@ contains
     stream%word = state
   end subroutine draw_in_disk
 
-  !> Number in [0, 1) that 64 random bits represent: the upper 53 bits as a multiple of 2**-53.
+  !> Converts 64 random bits to a number in [0, 1): the upper 53 bits times 2**-53.
   elemental function uniform(word) result(u)
     integer(int64), intent(in) :: word
     real(real64) :: u
@@ -219,8 +216,8 @@ contains
     word = ieor(word, ishft(word, -31))
   end subroutine draw_seed
 
-  !> Reduces a number, which may be the product of two 64-bit integers (at most 2**126 in
-  !> magnitude), modulo 2**64. The result is the lower 64 bits, interpreted as a signed integer.
+  !> Reduces an integer of magnitude up to 2**126, such as a product of two 64-bit integers, modulo
+  !> 2**64. The result contains the lower 64 bits as a signed integer.
   pure function wrapped(number) result(word)
     integer(int128), intent(in) :: number
     integer(int64) :: word

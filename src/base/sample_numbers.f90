@@ -1,12 +1,12 @@
-!> The numbers of samples, on their way to the output file.
+!> Buffers for the numbers of a sample before they are written to the output file.
 module sample_numbers
   use kinds, only: int64, real64
   implicit none
   private
   public :: first_values, sample_t
 
-  !> The values of one or more samples of the same quantities. The reals and the integers of a sample
-  !> are in two arrays, each in the order of the quantities.
+  !> One or more samples of the same quantities. Reals and integers are stored in separate arrays,
+  !> each in the order of the quantities.
   type :: sample_t
     real(real64), allocatable :: reals(:, :)         !! (reals in a sample, samples)
     integer(int64), allocatable :: integers(:, :)    !! (integers in a sample, samples)
@@ -19,10 +19,10 @@ module sample_numbers
 
 contains
 
-  !> Index of the first value of each of several quantities among the reals or the integers of a sample.
+  !> For each quantity, the index of its first value within the reals or the integers of a sample.
   pure function first_values(width, is_integer) result(first)
     integer, intent(in) :: width(:)                  !! number of values of each quantity
-    logical, intent(in) :: is_integer(:)             !! whether the values of each quantity are integers
+    logical, intent(in) :: is_integer(:)             !! whether the quantity has integer values
     integer :: first(size(width)), k
 
     first = [(1 + sum(width(:k - 1), is_integer(:k - 1) .eqv. is_integer(k)), k=1, size(width))]
@@ -36,7 +36,7 @@ contains
     n = size(self%reals, 2, int64)
   end function count_samples
 
-  !> Allocates `n` samples of the shape of another sample.
+  !> Allocates `n` samples with the quantities of another sample.
   subroutine make_room(self, like, n)
     class(sample_t), intent(out) :: self
     type(sample_t), intent(in) :: like
@@ -51,12 +51,12 @@ contains
     integer(int64), intent(in) :: n
     type(sample_t) :: part
 
-    call part%make_room(self, n)                     ! gfortran 12 warns of uninitialised bounds otherwise
+    call part%make_room(self, n)      ! without this call gfortran 12 warns of uninitialised bounds
     part%reals = self%reals(:, :n)
     part%integers = self%integers(:, :n)
   end function first
 
-  !> Replaces the samples after the first `n` by those of `new`.
+  !> Keeps the first `n` samples and appends those of `new`.
   subroutine insert(self, n, new)
     class(sample_t), intent(inout) :: self
     integer(int64), intent(in) :: n

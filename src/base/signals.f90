@@ -1,10 +1,9 @@
-!> Signals that stop a run or request a checkpoint. The signal handler and the variables that it
-!> sets are in `system_calls.c`.
+!> Signals that stop a run or request a checkpoint. The signal handler and its variables are in
+!> `system_calls.c`.
 !>
-!> Ending the program suddenly while the files of a run are open could lose data. A stop signal that
-!> arrives then is therefore only recorded; the main loop writes a checkpoint and ends the run.
-!> After the main loop a stop signal has no effect: the program completes the file and finishes the
-!> run.
+!> Killing the program while the files of a run are open could lose data. A stop signal during a run
+!> is therefore only recorded: the main loop then writes a checkpoint and ends the run. After the
+!> main loop a stop signal is ignored, and the program completes the output file.
 module signals
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_int, c_null_char
   use system, only: talks_to_terminal
@@ -14,26 +13,26 @@ module signals
 
   interface
     !> Installs the signal handler. TERM, INT, HUP and XCPU request a stop with a checkpoint; USR1
-    !> requests a checkpoint. Signals ignored when the program was started (for example by nohup)
-    !> stay ignored. XFSZ is ignored, so that a write beyond the size limit of files fails without a
-    !> signal.
+    !> requests a checkpoint. Signals that were already ignored when the program started (by nohup,
+    !> for example) remain ignored. XFSZ is ignored, so that exceeding the limit of the file size
+    !> makes the write fail instead of killing the program.
     subroutine watch_signals() bind(C, name="system_watch_signals")
     end subroutine watch_signals
 
-    !> Whether a signal has requested a stop.
+    !> True if a signal has requested a stop.
     function stop_requested() bind(C, name="system_stop_requested") result(yes)
       import :: c_bool
       logical(c_bool) :: yes
     end function stop_requested
 
-    !> Number of USR1 signals received so far, each of which requests a checkpoint.
+    !> Number of checkpoint requests (USR1 signals) received so far.
     function checkpoint_requests() result(requests) bind(C, name="system_checkpoint_requests")
       import :: c_int
       integer(c_int) :: requests
     end function checkpoint_requests
 
-    !> From this call on, a stop signal is only recorded instead of ending the program; see
-    !> `stop_requested`.
+    !> From this call on, a stop signal is recorded for `stop_requested` and no longer ends the
+    !> program.
     subroutine record_signals() bind(C, name="system_record_signals")
     end subroutine record_signals
 
@@ -47,8 +46,8 @@ module signals
 contains
 
   !> From this call on, a stop signal ends the program immediately, with the given message and exit
-  !> status. If one has already been recorded, the procedure itself ends the program. It precedes
-  !> parts of the program that can be interrupted without a loss of data.
+  !> status. If a stop signal was recorded earlier, this call ends the program. It is made before
+  !> tasks that can be interrupted without losing data.
   subroutine end_at_signals(message, code)
     character(len=*), intent(in) :: message
     integer, intent(in) :: code                        !! exit status

@@ -1,4 +1,4 @@
-!> Counting sort for items whose keys are small integers, such as cell numbers.
+!> Counting sort by small integer keys, such as cell numbers.
 module sorting
   use kinds, only: int32
   implicit none
@@ -7,14 +7,16 @@ module sorting
 
 contains
 
-  !> Finds the order of ascending keys. Items with equal keys keep their relative order.
+  !> Computes the permutation that sorts the keys in ascending order. Items with equal keys keep
+  !> their relative order.
   pure subroutine sort_by_count(key, n_keys, first, order)
     integer(int32), intent(in) :: key(:)                  !! (n) key of each item, from 1 to n_keys
     integer(int32), intent(in) :: n_keys
-    !> (n_keys+1) sorted position of the first item with each key; the last element is n+1.
+    !> Sorted position of the first item with each key; shape (n_keys+1), where the last element is
+    !> n+1.
     integer(int32), allocatable, intent(out) :: first(:)
     integer(int32), intent(out) :: order(:)               !! (n) index of the item at each sorted position
-    integer(int32), allocatable :: next(:)                ! (n_keys+1) sorted position of the next item with each key
+    integer(int32), allocatable :: next(:)                ! sorted position of the next item with each key
     integer(int32) :: k
 
     allocate (next(n_keys + 1), source=0_int32)

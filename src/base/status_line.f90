@@ -1,5 +1,5 @@
-!> A status line on standard error that shows the progress of the program. On a terminal it is
-!> updated in place; in a file or a pipe a new line is written every half minute.
+!> Progress display on standard error. On a terminal the status line is updated in place; in a file
+!> or a pipe a new line is written every 30 seconds.
 module status_line
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: real64
@@ -8,16 +8,18 @@ module status_line
   private
   public :: status_line_t
 
-  real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! time between two updates of the line [s]
-  character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! control sequence that erases the rest of a line
-    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! control sequences for the wrapping of long lines
+  !> Time between two updates on a terminal and in a file [s].
+  real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64
+  character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! erases the rest of a line
+    !> Disables and enables the wrapping of long lines.
+    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"
 
   type :: status_line_t
     logical, private :: quiet = .true.
     logical, private :: terminal = .false.
     logical, private :: shown = .false.
     real(real64), private :: pause = file_pause    !! time between two updates of the line [s]
-    real(real64), private :: next_update = 0.0_real64    !! time of the next update, on the clock `seconds` [s]
+    real(real64), private :: next_update = 0.0_real64    !! clock time of the next update [s]
   contains
     procedure :: open => open_line
     procedure :: is_due
@@ -29,7 +31,7 @@ module status_line
 
 contains
 
-  !> Prepares a status line, which shows nothing before this call.
+  !> Opens the status line; until then nothing is shown.
   subroutine open_line(self, quiet)
     class(status_line_t), intent(inout) :: self
     logical, intent(in) :: quiet
@@ -40,7 +42,7 @@ contains
     self%next_update = seconds() + self%pause
   end subroutine open_line
 
-  !> Whether the next update of the status line is due.
+  !> True if the next update of the status line is due.
   function is_due(self) result(yes)
     class(status_line_t), intent(in) :: self
     logical :: yes
@@ -49,7 +51,7 @@ contains
     if (.not. self%quiet) yes = seconds() >= self%next_update
   end function is_due
 
-  !> Shows a text in the status line.
+  !> Displays a text in the status line.
   subroutine show(self, text)
     class(status_line_t), intent(inout) :: self
     character(len=*), intent(in) :: text
@@ -64,7 +66,7 @@ contains
     flush (error_unit)
   end subroutine show
 
-  !> Shows the completed fraction of a task in the status line, if an update is due.
+  !> Displays the progress of a task in the status line if an update is due.
   subroutine show_share(self, task, share)
     class(status_line_t), intent(inout) :: self
     character(len=*), intent(in) :: task
@@ -76,7 +78,7 @@ contains
     call self%show(task//": "//trim(adjustl(percent)))
   end subroutine show_share
 
-  !> Writes a message that stays, unless the program is quiet.
+  !> Prints a message above the status line, unless the program is quiet.
   subroutine tell(self, message)
     class(status_line_t), intent(inout) :: self
     character(len=*), intent(in) :: message
@@ -87,7 +89,7 @@ contains
     flush (error_unit)
   end subroutine tell
 
-  !> Erases the status line on the terminal, so that the next message starts on an empty line.
+  !> Erases the status line from the terminal before a message is printed.
   subroutine clear(self)
     class(status_line_t), intent(inout) :: self
 

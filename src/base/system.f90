@@ -1,6 +1,6 @@
-!> Services of the operating system that Fortran does not provide: a monotonic clock, the detection
-!> of terminals, file locks, atomic renaming, the free disk space, and an exit without a message.
-!> Functions that need a C header file are in `system_calls.c`.
+!> Operating-system services that Fortran does not provide: a monotonic clock, detection of
+!> terminals, file locks, atomic renaming, free disk space, and an exit without a message. Functions
+!> that need a C header file are in `system_calls.c`.
 module system
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_double, c_int, c_int64_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: error_unit
@@ -14,16 +14,16 @@ module system
   public :: file_size, largest_file, read_bytes, read_file, write_word
   public :: fill_standard_streams, print_text, cores_of_process
 
-  !> Kinds of objects that a path can name.
+  !> Kinds of file-system objects.
   character(len=20), parameter :: kinds_of_files(*) = [character(len=20) :: "nothing", "a file", "a folder", &
     "a symbolic link", "a pipe or a device", "hidden by the system"]
 
-  !> Results of `c_lock` if no lock was acquired: another run holds the lock, the file is not a lock
-  !> file, or a system call failed.
+  !> Results of `c_lock` without a lock: another run holds the lock, the file is not a lock file, or
+  !> a system call failed.
   integer(c_int), parameter :: taken = -1, foreign = -3, failed = -4     ! -2: the file system has no locks
 
-  !> A lock on the output of a run. The operating system releases it when the process ends, even
-  !> after a crash.
+  !> Lock on the output file of a run. The operating system releases the lock when the process ends,
+  !> even by a crash.
   type :: lock_t
     character(len=:), allocatable :: path
     integer(c_int), private :: descriptor = -1
@@ -33,21 +33,21 @@ module system
   end type lock_t
 
   abstract interface
-    !> Interface of calls that have a path or a string as argument and return 0 for success.
+    !> System call with a path or a string as argument; returns 0 for success.
     function path_call(path) bind(C) result(status)
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int) :: status
     end function path_call
 
-    !> Interface of calls that have the path of a file or folder as argument and return a size in bytes.
+    !> System call with the path of a file or folder as argument; returns a size in bytes.
     function size_call(path) bind(C) result(bytes)
       import :: c_char, c_int64_t
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int64_t) :: bytes
     end function size_call
 
-    !> Interface of a call that renames a file and returns 0 for success.
+    !> System call that renames a file; returns 0 for success.
     function naming_call(from, to) bind(C) result(status)
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: from(*), to(*)
@@ -56,31 +56,32 @@ module system
   end interface
 
   interface
-    !> Present time of a monotonic clock, which never runs backwards. [s]
+    !> Current time of a monotonic clock, in seconds.
     function seconds() result(t) bind(C, name="system_seconds")
       import :: c_double
       real(c_double) :: t
     end function seconds
 
-    !> Opens /dev/null for each standard stream that the caller has closed. Otherwise the system
-    !> would assign its descriptor to the next file that is opened, and messages would be written
-    !> into that file.
+    !> Opens /dev/null for each standard stream that was closed when the program started. Otherwise
+    !> the next file to be opened would receive its descriptor, and messages would be written to
+    !> that file.
     subroutine fill_standard_streams() bind(C, name="system_fill_standard_streams")
     end subroutine fill_standard_streams
 
-    !> Whether standard error is a terminal.
+    !> True if standard error is a terminal.
     function talks_to_terminal() bind(C, name="system_talks_to_terminal") result(yes)
       import :: c_bool
       logical(c_bool) :: yes
     end function talks_to_terminal
 
-    ! The functions of the following interfaces are described in system_calls.c.
+    ! These functions are described in system_calls.c.
     function cores_of_process() result(n) bind(C, name="system_cores")
       import :: c_int
       integer(c_int) :: n
     end function cores_of_process
 
-    !> Largest size of a file that this process may write (ulimit -f), in bytes; huge if there is no limit.
+    !> Size limit for files of this process (ulimit -f), in bytes; a huge number if there is no
+    !> limit.
     function largest_file() result(bytes) bind(C, name="system_largest_file")
       import :: c_int64_t
       integer(c_int64_t) :: bytes
@@ -142,20 +143,22 @@ module system
   procedure(path_call), bind(C, name="system_synchronize") :: c_synchronize
   procedure(path_call), bind(C, name="system_find_folder") :: c_find_folder
   procedure(path_call), bind(C, name="system_make_folder") :: c_make_folder
-  procedure(path_call), bind(C, name="system_what_is") :: c_what_is   !! returns the position of the kind in `kinds_of_files`
-  procedure(path_call), bind(C, name="system_lock") :: c_lock  !! returns a file descriptor, or an error code < 0 such as `taken`
+  procedure(path_call), bind(C, name="system_what_is") :: c_what_is  !! returns an index into `kinds_of_files`
+  !> Returns a file descriptor, or a negative error code such as `taken`.
+  procedure(path_call), bind(C, name="system_lock") :: c_lock
   procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
-  procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes  !! free space in the file system that contains a folder
+  !> Returns the free space of the file system that contains a folder [bytes].
+  procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes
   procedure(size_call), bind(C, name="system_file_size") :: c_file_size
   procedure(naming_call), bind(C, name="rename") :: c_rename
 
 contains
 
-  !> Writes a string to standard output. The `write` statement of Fortran reports no error if
-  !> standard output is a file on a full disk.
+  !> Prints a string to standard output. The `write` statement of Fortran would not report a full
+  !> disk.
   subroutine print_text(text, error)
-    character(len=*), intent(in) :: text               !! one or more lines; a line end is added after the last line
+    character(len=*), intent(in) :: text               !! one or more lines; a final line end is added
     type(error_t), allocatable, intent(out) :: error
 
     if (c_print(text//new_line("a")//c_null_char) /= 0) &
@@ -170,7 +173,7 @@ contains
     call c_exit(int(code, c_int))
   end subroutine end_program
 
-  !> Host name of the computer on which the program runs.
+  !> Name of the computer on which the program runs.
   function host_name() result(name)
     character(len=:), allocatable :: name
     character(len=256, kind=c_char) :: buffer
@@ -179,9 +182,9 @@ contains
     name = buffer(:index(buffer, c_null_char) - 1)
   end function host_name
 
-  !> Renames a file, atomically replacing any file with the new name. `moved` is .true. after a
-  !> renaming even if the folder cannot be synchronised with the disk; only a crash of the operating
-  !> system could then undo it.
+  !> Renames a file atomically and replaces an existing file of the new name. `moved` is .true. even
+  !> if the folder cannot be synchronised with the disk afterwards; in this case only a crash of the
+  !> operating system could undo the renaming.
   subroutine move_file(from, to, moved)
     character(len=*), intent(in) :: from, to
     logical, intent(out) :: moved
@@ -191,7 +194,7 @@ contains
     if (moved) call synchronize(folder_of(to), done)
   end subroutine move_file
 
-  !> Removes a file if it exists.
+  !> Deletes a file if it exists.
   subroutine remove_file(path)
     character(len=*), intent(in) :: path
     integer(c_int) :: status
@@ -199,7 +202,7 @@ contains
     status = c_unlink(path//c_null_char)
   end subroutine remove_file
 
-  !> Creates the missing folders on the path of a file.
+  !> Creates the missing parent folders of a file.
   subroutine make_folders_of(path, made)
     character(len=*), intent(in) :: path
     logical, intent(out) :: made
@@ -214,7 +217,7 @@ contains
     made = is_folder(folder_of(path))
   end subroutine make_folders_of
 
-  !> Waits until the contents of a file, or the entries of a folder, are stored on the disk.
+  !> Waits until the contents of a file or the entries of a folder are stored on disk.
   subroutine synchronize(path, done)
     character(len=*), intent(in) :: path
     logical, intent(out) :: done
@@ -222,8 +225,8 @@ contains
     done = c_synchronize(path//c_null_char) == 0
   end subroutine synchronize
 
-  !> Reason why a file cannot be opened; empty if it can. A file with a second name (a symbolic or
-  !> hard link) must not be opened for writing.
+  !> Reason why a file cannot be opened; empty if it can. A file with several names (symbolic or
+  !> hard links) must not be opened for writing.
   function opening_problem(path, writable) result(text)
     character(len=*), intent(in) :: path
     logical, intent(in) :: writable
@@ -234,7 +237,7 @@ contains
     text = buffer(:index(buffer, c_null_char) - 1)
   end function opening_problem
 
-  !> Kind of the object that a path names, in words. Symbolic links are not followed.
+  !> Kind of the file-system object at a path, in words. Symbolic links are not followed.
   function what_is(path) result(kind)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: kind
@@ -243,7 +246,7 @@ contains
   end function what_is
 
   !> Inode, size and modification time of a file, which together identify the file and its contents;
-  !> three zeros if it does not exist. A copy of a file has a different inode.
+  !> a copy has a different inode. The result is zero if the file does not exist.
   function identity_of(path) result(identity)
     character(len=*), intent(in) :: path
     integer(int64) :: identity(3)
@@ -251,7 +254,7 @@ contains
     call c_identify(path//c_null_char, identity)
   end function identity_of
 
-  !> Size of a file; 0 for pipes and devices, -1 if the file does not exist. [bytes]
+  !> Size of a file in bytes; 0 for pipes and devices, -1 if the file does not exist.
   function file_size(path) result(bytes)
     character(len=*), intent(in) :: path
     integer(int64) :: bytes
@@ -259,26 +262,28 @@ contains
     bytes = c_file_size(path//c_null_char)
   end function file_size
 
-  !> Reads the first bytes of a regular file. The `open` statement of Fortran would remove trailing
-  !> blanks from the name of the file.
+  !> Reads the first bytes of a regular file. A Fortran `open` statement would remove trailing
+  !> blanks from the file name.
   subroutine read_bytes(path, bytes, n)
     character(len=*), intent(in) :: path
     character(len=*), intent(out) :: bytes
-    integer(int64), intent(out) :: n                   !! number of bytes read, at most len(bytes); -1 if the file cannot be read
+    !> Number of bytes read, at most len(bytes), or -1 if the file cannot be read.
+    integer(int64), intent(out) :: n
 
     n = c_read_bytes(path//c_null_char, bytes, len(bytes, int64))
   end subroutine read_bytes
 
-  !> Reads all bytes of a regular file. The `read` statement of Fortran can return `iostat` 0
-  !> without reading any bytes, which would lead to an infinite loop.
+  !> Reads a whole regular file. A Fortran `read` statement may report success without reading any
+  !> bytes, which would cause an infinite loop.
   subroutine read_file(path, text, problem)
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text
-    character(len=:), allocatable, intent(out) :: problem    !! reason why the file cannot be read; empty after success
+    !> Reason why the file cannot be read; empty after success.
+    character(len=:), allocatable, intent(out) :: problem
     character(len=:), allocatable :: failure
     integer(int64) :: n
 
-    allocate (character(len=max(file_size(path), 8192_int64)) :: text)  ! files in /proc have the size 0
+    allocate (character(len=max(file_size(path), 8192_int64)) :: text)  ! files in /proc report a size of 0
     call read_bytes(path, text, n)
     text = text(:max(n, 0_int64))
     problem = ""
@@ -288,17 +293,17 @@ contains
     if (problem == "") problem = failure
   end subroutine read_file
 
-  !> Overwrites eight bytes of a file with a 64-bit integer in little-endian order.
+  !> Overwrites eight bytes of a file with a 64-bit integer in little-endian byte order.
   subroutine write_word(path, position, word, done)
     character(len=*), intent(in) :: path
-    integer(int64), intent(in) :: position             !! position of the byte to start from; 0 is the first byte of the file
+    integer(int64), intent(in) :: position             !! offset of the first byte from the start of the file
     integer(int64), intent(in) :: word
     logical, intent(out) :: done
 
     done = c_write_word(path//c_null_char, position, word) == 0
   end subroutine write_word
 
-  !> Whether a path names a folder, or a symbolic link to a folder.
+  !> True if the path is a folder or a symbolic link to a folder.
   function is_folder(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -306,7 +311,7 @@ contains
     yes = c_find_folder(path//c_null_char) == 0
   end function is_folder
 
-  !> Path of the folder that contains the file with the given path.
+  !> Parent folder of a file.
   pure function folder_of(path) result(folder)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: folder
@@ -315,7 +320,8 @@ contains
     if (folder == "") folder = "."
   end function folder_of
 
-  !> Free space in the file system that contains, or will contain, a file; huge if the free space is unknown. [bytes]
+  !> Free space for a file in the file system of its (possibly missing) folder, in bytes; a huge
+  !> number if the free space is unknown.
   function free_bytes(path) result(bytes)
     character(len=*), intent(in) :: path
     integer(int64) :: bytes
@@ -323,7 +329,7 @@ contains
     bytes = c_free_bytes(folder_of(path)//c_null_char)
   end function free_bytes
 
-  !> Reason for the failure of the last system call, as a message of the operating system.
+  !> Error message of the operating system for the last failed system call.
   function last_problem() result(text)
     character(len=:), allocatable :: text
     character(len=256, kind=c_char) :: buffer
@@ -332,12 +338,13 @@ contains
     text = buffer(:index(buffer, c_null_char) - 1)
   end function last_problem
 
-  !> Acquires the lock file `path` for this process. On a file system without locks the run
-  !> continues without one.
+  !> Acquires the lock file `path` for this process. If the file system does not support locks, the
+  !> run continues without a lock.
   subroutine acquire(self, path, problem)
     class(lock_t), intent(inout) :: self
     character(len=*), intent(in) :: path
-    character(len=:), allocatable, intent(out) :: problem    !! reason why the lock cannot be acquired; empty after success
+    !> Reason why the lock was not acquired; empty after success.
+    character(len=:), allocatable, intent(out) :: problem
 
     self%path = path
     self%descriptor = c_lock(path//c_null_char)
@@ -354,7 +361,7 @@ contains
     end select
   end subroutine acquire
 
-  !> Removes the lock file and releases the lock, if this process holds it.
+  !> Deletes the lock file and releases the lock if this process holds it.
   subroutine release(self)
     class(lock_t), intent(inout) :: self
 

@@ -1,4 +1,4 @@
-!> Short strings: lists of strings, numbers as strings, and suggestions for misspelt words.
+!> String utilities: lists of strings, numbers as strings, and suggestions for misspelt words.
 module texts
   use, intrinsic :: ieee_arithmetic, only: ieee_is_normal
   use kinds, only: int64, real64
@@ -7,12 +7,12 @@ module texts
   public :: text_t, growing_text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
   public :: about, counted, line_at, lines_of, size_text, wrapped
 
-  !> A string of any length; arrays of this type are lists of strings.
+  !> String of any length; an array of this type is a list of strings.
   type :: text_t
     character(len=:), allocatable :: text
   end type text_t
 
-  !> A string assembled piece by piece, in a time proportional to its length.
+  !> String assembled from pieces, in a time proportional to its final length.
   type :: growing_text_t
     private
     character(len=:), allocatable :: buffer
@@ -35,7 +35,7 @@ module texts
 
 contains
 
-  !> Appends a piece to the text.
+  !> Appends a piece to the string.
   pure subroutine add(self, piece)
     class(growing_text_t), intent(inout) :: self
     character(len=*), intent(in) :: piece
@@ -53,7 +53,7 @@ contains
     self%length = needed
   end subroutine add
 
-  !> The string of all pieces added so far.
+  !> Concatenation of all pieces added so far.
   pure function text_so_far(self) result(text)
     class(growing_text_t), intent(in) :: self
     character(len=:), allocatable :: text
@@ -62,7 +62,7 @@ contains
     if (allocated(self%buffer)) text = self%buffer(:self%length)
   end function text_so_far
 
-  !> Converts an integer of default kind to decimal digits.
+  !> Converts a default integer to a string.
   pure function written_integer(number) result(text)
     integer, intent(in) :: number
     character(len=:), allocatable :: text
@@ -70,7 +70,7 @@ contains
     text = written_long_integer(int(number, int64))
   end function written_integer
 
-  !> Converts a 64-bit integer to decimal digits.
+  !> Converts a 64-bit integer to a string.
   pure function written_long_integer(number) result(text)
     integer(int64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -80,15 +80,15 @@ contains
     text = trim(buffer)
   end function written_long_integer
 
-  !> Converts a real number to a string without trailing zeros, with an exponent only if that makes
-  !> it shorter.
+  !> Converts a real number to a string without trailing zeros. An exponent is used only if the
+  !> string becomes shorter.
   pure recursive function written_real(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
     character(len=24) :: buffer
     integer :: exponent
 
-    ! the number is NaN, infinite or denormal; a denormal number would make 10**exponent underflow
+    ! NaN, infinite or denormal; for a denormal number 10**exponent would underflow
     if (.not. ieee_is_normal(number)) then
       write (buffer, "(es24.16e3)") number
       text = trim(adjustl(buffer))
@@ -102,8 +102,7 @@ contains
     end if
   end function written_real
 
-  !> Converts a real number to a string with as many digits as are needed to recover exactly the
-  !> same number.
+  !> Converts a real number to a string with enough digits to recover exactly the same number.
   pure function written_exactly(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -117,7 +116,7 @@ contains
     text = trim(adjustl(buffer))
   end function written_exactly
 
-  !> The string with ASCII letters in lower case and all other bytes unchanged.
+  !> Converts ASCII letters to lower case.
   pure function lower_case(text) result(lower)
     character(len=*), intent(in) :: text
     character(len=len(text)) :: lower
@@ -130,7 +129,7 @@ contains
     end do
   end function lower_case
 
-  !> The string with each control character replaced by `?`.
+  !> Replaces each control character by `?`.
   pure function legible(text) result(line)
     character(len=*), intent(in) :: text
     character(len=len(text)) :: line
@@ -142,8 +141,8 @@ contains
     end do
   end function legible
 
-  !> A string from a user or a file, prepared for a message: quoted, with control characters
-  !> replaced, and truncated if long.
+  !> Quotes a string from a user or a file for a message. Control characters are replaced, and a
+  !> long string is truncated.
   pure function shown(text) result(quoted)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted
@@ -152,7 +151,7 @@ contains
 
     last = min(len(text), longest)
     do while (last > longest - 4 .and. last < len(text))
-      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! a UTF-8 character must not be split
+      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! a UTF-8 character must stay whole
       last = last - 1
     end do
     quoted = legible(text(:last))
@@ -160,7 +159,7 @@ contains
     quoted = '"'//quoted//'"'
   end function shown
 
-  !> Joins words to one line, with the separator `glue` between consecutive words.
+  !> Joins words into one line, separated by `glue`.
   pure function joined(words, glue) result(line)
     character(len=*), intent(in) :: words(:)
     character(len=*), intent(in) :: glue
@@ -175,8 +174,8 @@ contains
     line = growing%text()
   end function joined
 
-  !> Breaks a text at blanks into lines of at most `width` characters, all but the first starting
-  !> with `margin`. A word longer than `width` has a line of its own.
+  !> Wraps a text at blanks into lines of at most `width` characters. All lines but the first start
+  !> with `margin`; a word longer than `width` occupies a line of its own.
   pure function wrapped(text, width, margin) result(lines)
     character(len=*), intent(in) :: text, margin
     integer, intent(in) :: width
@@ -195,7 +194,7 @@ contains
     lines = lines//trim(text(first:))
   end function wrapped
 
-  !> Position of a word in a list; 0 if it is not there.
+  !> Index of a word in a list; 0 if the list does not contain it.
   pure function place_of(word, words) result(place)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: words(:)
@@ -207,12 +206,12 @@ contains
     place = 0
   end function place_of
 
-  !> Advice for a user who entered an unknown word: the most similar known word or, if none is
-  !> similar, a list of the known words.
+  !> Advice about a misspelt word: the most similar known word, or else a list of the known words.
   pure function suggestion(word, known, listed) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
-    character(len=*), intent(in), optional :: listed(:)  !! words to list if no known word is similar, instead of `known`
+    !> Words listed instead of `known` if no known word is similar.
+    character(len=*), intent(in), optional :: listed(:)
     character(len=:), allocatable :: advice
 
     advice = nearest_word(word, known)
@@ -225,8 +224,8 @@ contains
     end if
   end function suggestion
 
-  !> The known word that a user probably meant by `word`: one that starts with `word`, or that
-  !> differs in at most a third of the letters; empty if there is none.
+  !> Known word that was probably meant by `word`: it starts with `word`, or differs from it in at
+  !> most a third of the letters. The result is empty if no known word is similar.
   pure function nearest_word(word, known) result(nearest)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
@@ -250,8 +249,9 @@ contains
     end do
   end function nearest_word
 
-  !> Number of insertions, deletions, substitutions and swaps of adjacent letters that turn `a` into `b` (optimal string alignment,
-  !> Damerau, 1964, doi:10.1145/363958.363994).
+  !> Edit distance of two words: the number of insertions, deletions, substitutions and swaps of
+  !> adjacent letters that turn `a` into `b` (optimal string alignment, Damerau, 1964,
+  !> doi:10.1145/363958.363994).
   pure function edit_distance(a, b) result(distance)
     character(len=*), intent(in) :: a, b
     integer :: distance
@@ -272,7 +272,7 @@ contains
     distance = d(len(a), len(b))
   end function edit_distance
 
-  !> Converts a number of bytes to a text in kB or MB, for messages.
+  !> Formats a number of bytes as kB or MB, for messages.
   pure function size_text(bytes) result(text)
     integer(int64), intent(in) :: bytes
     character(len=:), allocatable :: text
@@ -284,7 +284,7 @@ contains
     end if
   end function size_text
 
-  !> Rounds a positive number to three significant digits and converts it to a string.
+  !> Formats a positive number, rounded to three significant digits.
   pure function about(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -294,8 +294,7 @@ contains
     text = written(anint(number/unit)*unit)
   end function about
 
-  !> A number followed by a noun, in the plural unless the number is 1, as in `1 value` and `2
-  !> values`.
+  !> Formats a number and a noun, in the plural unless the number is 1: `1 value`, `2 values`.
   pure function counted(number, noun) result(text)
     integer(int64), intent(in) :: number
     character(len=*), intent(in) :: noun
@@ -305,18 +304,18 @@ contains
     if (number /= 1) text = text//"s"
   end function counted
 
-  !> Number of the line that contains character k of a text; k may also be the position just after
-  !> its end.
+  !> The line of a text that contains character k. The position k may also be just after the end of
+  !> the text.
   pure function line_at(text, k) result(line)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: k                      !! position of the character
+    integer, intent(in) :: k                      !! position of a character in the text
     character(len=:), allocatable :: line
 
     line = text(index(text(:k - 1), eol, back=.true.) + 1:)
     line = line(:index(line//eol, eol) - 1)
   end function line_at
 
-  !> Splits a text into its lines, without line ends.
+  !> Splits a text into lines, without their line ends.
   subroutine lines_of(text, lines)
     character(len=*), intent(in) :: text
     type(text_t), allocatable, intent(out) :: lines(:)

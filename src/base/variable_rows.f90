@@ -1,5 +1,4 @@
-!> Definitions for the table of all input variables: the types of the rows and of the choices, and
-!> the ranges and limits of numbers.
+!> Row types of the table of input variables and of their keywords, and the ranges of numbers.
 module variable_rows
   use kinds, only: real64
   implicit none
@@ -7,12 +6,15 @@ module variable_rows
 
   integer, parameter, public :: name_length = 37, help_length = 1000
   integer, parameter, public :: most_threads = 1024, most_disks = 100000000
-  real(real64), parameter, public :: smallest = 1.0e-100_real64    !! smallest absolute value of a nonzero number in the input
-  real(real64), parameter, public :: largest = 1.0e100_real64  !! largest absolute value of a number in the input
+  !> Smallest absolute value of a nonzero number in the input.
+  real(real64), parameter, public :: smallest = 1.0e-100_real64
+  !> Largest absolute value of a number in the input.
+  real(real64), parameter, public :: largest = 1.0e100_real64
 
-  !> When a variable may change after the start of a run: never, on `--resume` (if it does not
-  !> affect the trajectory), or in a running simulation (if it affects the motion of the disks, but
-  !> not their number, properties or initial state).
+  !> When a variable may change after the start of a run: never, on `--resume`, or while the
+  !> simulation is running. Variables that do not affect the trajectory may change on `--resume`. A
+  !> running simulation accepts changes of variables that affect the motion of the disks, but not of
+  !> their number, properties or initial state.
   character(len=9), parameter, public :: never = "never", on_resume = "on resume", in_motion = "running"
 
   type, public :: range_t
@@ -20,10 +22,10 @@ module variable_rows
     character(len=24) :: words
   end type range_t
 
-  !> Groups that describe obstacles.
+  !> Input groups of obstacles.
   character(len=8), parameter, public :: obstacle_groups(2) = [character(len=8) :: "obstacle", "wall"]
-  !> Groups that describe boundaries: sides of the box and obstacles. In the reference file they are
-  !> commented out.
+  !> Input groups of boundaries: sides of the box and obstacles. The reference file contains them as
+  !> comments.
   character(len=8), parameter, public :: wall_groups(*) = [character(len=8) :: "side", obstacle_groups]
 
   type(range_t), parameter, public :: anything = range_t(-largest, largest, "")
@@ -47,40 +49,42 @@ module variable_rows
     character(len=8) :: group
     character(len=name_length) :: name
     character(len=8) :: kind                 !! type of the values, 'integer', 'real', 'logical' or 'text'
-    integer :: size                          !! required number of values; 0 if any number of values is allowed
-    character(len=8) :: status               !! a status, as explained at the end of this file
-    character(len=24) :: value  !! default or example, as written in an input file
-    character(len=help_length) :: help       !! help text in full sentences; the first sentence names the quantity
+    integer :: size                          !! required number of values; 0 allows any number
+    character(len=8) :: status               !! one of the keywords explained at the end of this file
+    character(len=24) :: value  !! default or example, as in an input file
+    !> Help text in full sentences, beginning with the name of the quantity.
+    character(len=help_length) :: help
     type(range_t) :: range = anything        !! range of numbers
     character(len=16) :: unit = ""
-    !> Keywords, separated by blanks, that are allowed; empty if any string is allowed. The module
-    !> `choices` contains their meanings.
+    !> Allowed keywords, separated by blanks; empty if any string is allowed. The meanings of the
+    !> keywords are in the module `choices`.
     character(len=240) :: choices = ""
-    !> Condition under which the variable has an effect: the name of a second variable, followed by
-    !> one or more of its values. Example: "motion sine parabolic" means that the variable applies
-    !> only if motion is 'sine' or 'parabolic'.
+    !> Condition under which the variable has an effect: the name of another variable, followed by
+    !> one or more of its values. For example, "motion sine parabolic" limits a variable to the
+    !> motions 'sine' and 'parabolic'.
     character(len=60) :: goes_with = ""
-    !> Names of variables in the same group, separated by blanks, that cannot be combined with this
-    !> one.
+    !> Names of variables of the same group, separated by blanks, that exclude this variable.
     character(len=80) :: excludes = ""
-    character(len=9) :: may_change = never   !! when the value may change after the start of a run
-    character(len=100) :: otherwise = ""     !! description of the default if the default is not a constant
+    character(len=9) :: may_change = never   !! when the value may change: `never`, `on_resume` or `in_motion`
+    character(len=100) :: otherwise = ""     !! description of a default that is not a constant
   end type variable_t
 
-  !> An allowed keyword of a variable. Variables with the same name in several groups have the same
+  !> An allowed keyword of a variable. Variables of the same name in different groups have the same
   !> keywords.
   type, public :: choice_t
     character(len=19) :: name                !! name of the variable
-    character(len=17) :: word                !! the keyword
-    character(len=300) :: meaning            !! description in one or more full sentences or phrases
+    character(len=17) :: word                !! keyword
+    character(len=300) :: meaning            !! meaning of the keyword, in full sentences or phrases
   end type choice_t
 
-  ! The status of a variable determines its line in the reference file and the meaning of the
-  ! component `value`:
-  ! - "default": the default value, which the line contains.
-  ! - "fallback": the default value where the variable applies; the line is a comment.
-  ! - "example": an example, because a value must be given.
-  ! - "required": an example, as a comment; must be given with the choice with which it applies.
-  ! - "optional": an example, as a comment; there is no default, and the variable need not be given.
+  ! The status of a variable determines its line in the reference file and the meaning of `value`:
+  ! - "default": the line contains the default value.
+  ! - "fallback": the line is a comment with the value that is the default where the variable
+  !   applies.
+  ! - "example": the line contains an example, because every input must set the variable.
+  ! - "required": the line is a comment with an example; the choice to which the variable belongs
+  !   requires a value.
+  ! - "optional": the line is a comment with an example; there is no default, and no value is
+  !   required.
 
 end module variable_rows
