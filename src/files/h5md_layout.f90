@@ -1,6 +1,6 @@
-!> Layout of an output file, which follows H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html): the
-!> names of groups and the fixed paths of datasets. The names of observables are defined in
-!> `observables`, those in the event log in `samples`.
+!> Layout of the output file, which follows H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html): names
+!> of groups and fixed paths of datasets. The module `observables` defines the names of observables,
+!> and `samples` those of the event log.
 module h5md_layout
   implicit none
   private
@@ -12,9 +12,10 @@ module h5md_layout
     events_group = "events/", &
     parameters_group = "parameters/", &
     provenance = "provenance", &
-    checkpoint_group = "checkpoint/", &           !! group of the data from which a run can be resumed
+    checkpoint_group = "checkpoint/", &           !! group of the checkpoint data
     box_group = disks_group//"box", &
-    all_disks = "all"                             !! group for averages over all disks, in `observables_group`
+    !> Group of averages over all disks, within `observables_group`.
+    all_disks = "all"
 
   ! Datasets
   character(len=*), parameter, public :: &
@@ -22,8 +23,10 @@ module h5md_layout
     disk_species = disks_group//"species", &
     disk_mass = disks_group//"mass", &
     disk_radius = disks_group//"radius", &
-    changes_at_work = parameters_group//"changes", &     !! all changes, including those of the schedule
-    earlier_changes = checkpoint_group//"changes", &      !! changes that the input in the file already contains
+    !> All changes of the system, including the scheduled ones.
+    changes_at_work = parameters_group//"changes", &
+    !> Changes that the stored input already includes.
+    earlier_changes = checkpoint_group//"changes", &
     species_names = parameters_group//"species/names", &
     species_counts = parameters_group//"species/counts"
 
@@ -31,9 +34,10 @@ module h5md_layout
   character(len=*), parameter, public :: &
     wall_time = provenance//"@wall_time", &
     saved_at = provenance//"/saved_at", &
-    replaced_file = provenance//"@replaced"       !! identity of the existing file that the finished output may replace
+    !> Identity of the existing file that the finished output may replace.
+    replaced_file = provenance//"@replaced"
 
-  ! H5MD elements; each element is a group with the datasets step, time and value
+  ! H5MD elements: groups with the datasets step, time and value
   character(len=*), parameter, public :: &
     position = disks_group//"position", &
     velocity = disks_group//"velocity", &
@@ -44,14 +48,14 @@ module h5md_layout
     presence = disks_group//"present", &
     step_of = "/step", time_of = "/time", value_of = "/value"
 
-  ! Paths of the datasets that contain the numbers of complete samples
+  ! Paths of the counters of complete samples
   character(len=*), parameter, public :: &
     frame_counter = disks_group//"committed", &
     sample_counter = observables_group//"committed", &
     event_counter = events_group//"committed"
 
-  !> Names that a species must not have, because the HDF5 groups named after species also contain
-  !> objects with these names. The names of observables are forbidden, too.
+  !> Names that are forbidden for species, because the HDF5 groups named after species also contain
+  !> objects with these names. Names of observables are forbidden as well.
   character(len=*), parameter, public :: beside_species(3) = [character(len=9) :: "committed", "names", "counts"]
 
 end module h5md_layout

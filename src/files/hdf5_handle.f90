@@ -1,9 +1,9 @@
-!> An open HDF5 file, with procedures that create, open, rename, flush and close it and that create
-!> groups and hard links.
+!> An open HDF5 file: creating, opening, renaming, flushing and closing it, and creating groups and
+!> hard links.
 !>
 !> The first failure is recorded, and all later calls have no effect. A procedure that writes a file
-!> therefore need not test the result of every call; `report` returns the recorded failure at the
-!> end.
+!> therefore need not test the result of every call; at the end, `report` returns the recorded
+!> failure.
 module hdf5_handle
   use, intrinsic :: iso_c_binding, only: c_bool, c_int, c_int64_t
   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
@@ -21,27 +21,30 @@ module hdf5_handle
   private
   public :: hdf5_handle_t, hdf5_version
 
-  integer(size_t), parameter :: sieve = 4096      !! size of the buffer that collects small writes [bytes]
-  !> HDF5 stores the links of a group in nodes with space for 8 links, and the addresses of these
-  !> nodes in nodes of a second kind, with space for twice `half_tree_node` addresses. Most groups
-  !> of an output file have three links. With the default of HDF5, `half_tree_node` = 16, almost
-  !> empty nodes would make up a quarter of the file of a small run.
+  integer(size_t), parameter :: sieve = 4096      !! size of the buffer for small writes [bytes]
+  !> Half the number of addresses in a node of the second kind. HDF5 stores the links of a group in
+  !> nodes of 8 links, and the addresses of these nodes in nodes of a second kind. Most groups of an
+  !> output file have three links. With the HDF5 default of 16, almost empty nodes would occupy a
+  !> quarter of the file of a small run.
   integer, parameter :: half_tree_node = 2
-  !> Half the number of links in a node, the default of HDF5. The 7 links of the group `checkpoint`
-  !> must fit into one node, because `hdf5_objects: remove_last` relies on the order of the last
-  !> parts of a file.
+  !> Half the number of links in a node of the first kind; the HDF5 default. The 7 links of the
+  !> group `checkpoint` must fit into one node, because `hdf5_objects: remove_last` relies on the
+  !> order of the last parts of a file.
   integer, parameter :: half_link_node = 4
 
   type :: hdf5_handle_t
     character(len=:), allocatable :: path
-    character(len=:), allocatable :: final_path   !! path of the completed file, used in messages
-    character(len=:), allocatable :: failure      !! the first action that failed, as a phrase that can follow "cannot "
-    logical, private :: has_reason = .false.      !! whether the text `failure` includes a reason
+    character(len=:), allocatable :: final_path   !! path of the completed file, for messages
+    !> Phrase that completes "cannot ", describing the first failed action.
+    character(len=:), allocatable :: failure
+    logical, private :: has_reason = .false.      !! whether `failure` includes a reason
     integer(hid_t) :: id = -1
-    integer(hid_t) :: links = -1                  !! properties with which HDF5 creates missing groups of a path
-    integer(hid_t) :: storage = -1                !! HDF5 properties of datasets, set by `prepare`
-    integer(int64) :: unsaved = 0                 !! amount written since the last flush [bytes]
-    integer(hid_t), allocatable, private :: held(:)      !! datasets that stay open; only the first `n_held` are used
+    !> HDF5 properties for creating the missing groups of a path.
+    integer(hid_t) :: links = -1
+    integer(hid_t) :: storage = -1                !! HDF5 properties of new datasets, set by `prepare`
+    integer(int64) :: unsaved = 0                 !! bytes written since the last flush
+    !> Datasets that stay open; only the first `n_held` elements are used.
+    integer(hid_t), allocatable, private :: held(:)
     integer, private :: n_held = 0
   contains
     procedure :: create
@@ -65,10 +68,10 @@ module hdf5_handle
       integer(c_int) :: status
     end function forget_link
 
-    !> Makes HDF5 reserve no space for attributes in the header of a dataset.
+    !> Prevents HDF5 from reserving space for attributes in the header of a dataset.
     function reserve_no_attributes(properties, yes) result(status) bind(C, name="H5Pset_dset_no_attrs_hint")
       import :: c_bool, c_int, c_int64_t
-      integer(c_int64_t), value :: properties     !! an identifier of HDF5
+      integer(c_int64_t), value :: properties     !! HDF5 identifier
       logical(c_bool), value :: yes
       integer(c_int) :: status
     end function reserve_no_attributes
@@ -76,15 +79,16 @@ module hdf5_handle
 
 contains
 
-  !> Records the failure of an action if `status` indicates an error and no failure has been
-  !> recorded before.
+  !> Records the failure of an action if `status` indicates an error and no failure was recorded
+  !> earlier.
   subroutine check(self, status, action, reason, needed)
     class(hdf5_handle_t), intent(inout) :: self
-    integer, intent(in) :: status                 !! return value of an HDF5 call, which is negative after a failure
-    character(len=*), intent(in) :: action        !! the intended action, as a phrase that can follow "cannot "
+    integer, intent(in) :: status                 !! return value of an HDF5 call; negative after a failure
+    character(len=*), intent(in) :: action        !! phrase that completes "cannot "
     character(len=*), intent(in), optional :: reason    !! reason for the failure, if known
-    integer(int64), intent(in), optional :: needed  !! disk space that the action needs; default: the amount of unsaved data [bytes]
-    integer(hsize_t) :: bytes                     ! size of the file, including space allocated in advance
+    !> Disk space required by the action; default: the amount of unsaved data [bytes].
+    integer(int64), intent(in), optional :: needed
+    integer(hsize_t) :: bytes                     ! size of the file, including preallocated space
     integer(int64) :: most
     integer :: known
 
@@ -103,8 +107,8 @@ contains
     end if
   end subroutine check
 
-  !> Returns the recorded failure as an error, which is not allocated if there was none. The message
-  !> names the file, the action, and the reason or the free space on the disk.
+  !> Returns the recorded failure as an error; without a failure the error is not allocated. The
+  !> message names the file, the action, and either the reason or the free disk space.
   subroutine report(self, error)
     class(hdf5_handle_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -118,7 +122,7 @@ contains
     error%message = error%message//": "//written(self%unsaved)//" bytes needed, "//written(free)//" bytes free"
   end subroutine report
 
-  !> Version of the HDF5 library, for the provenance of a file.
+  !> Version of the HDF5 library, stored as provenance in the output file.
   function hdf5_version() result(text)
     character(len=:), allocatable :: text
     integer :: major, minor, release, status
@@ -127,10 +131,10 @@ contains
     text = written(major)//"."//written(minor)//"."//written(release)
   end function hdf5_version
 
-  !> Initialises the HDF5 library, only once per process, because each initialisation leaks memory.
-  !> HDF5 must not print errors, and needs no exit handler, because the program closes all files
-  !> before it exits; on a full disk, where a file cannot be closed, the exit handler would crash.
-  !> External links are disabled, because they could refer to devices or to files of other users.
+  !> Initialises the HDF5 library, once per process because each initialisation leaks memory. HDF5
+  !> must not print errors. It needs no exit handler, because the program closes all files before it
+  !> exits; on a full disk, where a file cannot be closed, the exit handler would crash. External
+  !> links are disabled, because they could refer to devices or to files of other users.
   subroutine start_library(status)
     integer, intent(out) :: status
     logical, save :: started = .false.
@@ -147,17 +151,17 @@ contains
   end subroutine start_library
 
   !> Sets the properties of a file.
-  !> - No file locks: with them, other programs could not read the file during a run, and a reader
-  !>   could stop a run.
-  !> - Storage is allocated when a dataset is created, without filling it and without time stamps,
-  !>   so that equal runs write equal bytes.
+  !> - File locks are disabled: otherwise other programs could not read the file during a run, and a
+  !>   reader could stop a run.
+  !> - Storage is allocated when a dataset is created, without fill values and time stamps, so that
+  !>   equal runs write identical bytes.
   !> - Small datasets do not share a block of storage, because HDF5 releases a shared block in two
   !>   steps, between which the header of the file contains a wrong length.
-  !> - No space is reserved for attributes of datasets, which the program never writes; the file of
-  !>   a small run is a tenth smaller.
+  !> - No space is reserved for attributes of datasets, because the program writes none. This
+  !>   reduces the file of a small run by a tenth.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
-    integer(hid_t), intent(out) :: access         !! HDF5 properties of the access to the file
+    integer(hid_t), intent(out) :: access         !! HDF5 properties for opening the file
     integer, intent(out) :: status
 
     call start_library(status)
@@ -174,11 +178,11 @@ contains
     if (status >= 0) status = reserve_no_attributes(int(self%storage, c_int64_t), logical(.true., c_bool))
   end subroutine prepare
 
-  !> Creates a file, which must not exist yet.
+  !> Creates a new file. The path must not exist.
   subroutine create(self, path, final_path)
     class(hdf5_handle_t), intent(out) :: self
     character(len=*), intent(in) :: path
-    character(len=*), intent(in), optional :: final_path    !! default: path
+    character(len=*), intent(in), optional :: final_path    !! default: `path`
     integer(hid_t) :: access, creation
     integer :: status, closed
 
@@ -214,7 +218,7 @@ contains
     call h5pclose_f(access, closed)
   end subroutine open_file
 
-  !> Renames the open file to its final path, replacing any file there.
+  !> Renames the open file to its final path and replaces an existing file there.
   subroutine rename_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     logical :: moved
@@ -225,7 +229,7 @@ contains
     if (moved) self%path = self%final_path
   end subroutine rename_file
 
-  !> Passes all written data to the operating system, so that none are lost if the program is
+  !> Passes all written data to the operating system, so that no data are lost if the program is
   !> killed.
   subroutine flush_file(self)
     class(hdf5_handle_t), intent(inout) :: self
@@ -237,7 +241,8 @@ contains
     if (status >= 0) self%unsaved = 0
   end subroutine flush_file
 
-  !> Keeps an open dataset until the file is closed. HDF5 cannot close a file that has open datasets.
+  !> Adds an open dataset to those that stay open until the file is closed. HDF5 cannot close a file
+  !> with open datasets.
   subroutine hold(self, dataset)
     class(hdf5_handle_t), intent(inout) :: self
     integer(hid_t), intent(in) :: dataset
@@ -249,8 +254,8 @@ contains
     self%held(self%n_held) = dataset
   end subroutine hold
 
-  !> Closes the file, if it is open, and frees the HDF5 property lists, which exist even if opening
-  !> failed. A recorded failure can still be reported.
+  !> Closes the file if it is open, and frees the HDF5 property lists, which exist even if the file
+  !> could not be opened. A recorded failure can still be reported.
   subroutine close_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     integer :: status, k
@@ -278,7 +283,7 @@ contains
     call remove_file(self%path)
   end subroutine discard
 
-  !> Creates a group, with all missing groups on its path.
+  !> Creates a group and all missing groups on its path.
   subroutine make_group(self, name)
     class(hdf5_handle_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -291,7 +296,7 @@ contains
     if (status >= 0) call h5gclose_f(group, closed)
   end subroutine make_group
 
-  !> Adds a second name (a hard link) for an object in the file.
+  !> Adds a second name (a hard link) to an object in the file.
   subroutine link(self, name, second_name)
     class(hdf5_handle_t), intent(inout) :: self
     character(len=*), intent(in) :: name, second_name

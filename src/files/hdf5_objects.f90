@@ -1,6 +1,6 @@
-!> Reads and writes attributes and datasets, or parts of datasets, in an open HDF5 file.
+!> Reads and writes datasets, parts of datasets, and attributes in an open HDF5 file.
 !>
-!> A name `group/dataset` is the path of a dataset; a name `group@name` denotes an attribute of a
+!> The name `group/dataset` is the path of a dataset; the name `group@name` is an attribute of a
 !> group.
 module hdf5_objects
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
@@ -20,10 +20,10 @@ module hdf5_objects
   private
   public :: hdf5_file_t, scalar
 
-  integer, parameter :: scalar(0) = [integer ::]  !! extents of a dataset with a single value
+  integer, parameter :: scalar(0) = [integer ::]  !! shape of a dataset with a single value
 
-  ! Limits of the lengths of strings in a file, because a damaged file may state wrong lengths. All
-  ! strings written by this program are shorter.
+  ! Upper limits of string lengths, because a damaged file may contain wrong lengths. All strings
+  ! written by this program are shorter.
   integer(int64), parameter :: most_texts = 10000
   integer(size_t), parameter :: longest_text = 67108864      !! [bytes]
 
@@ -45,17 +45,18 @@ module hdf5_objects
 
 contains
 
-  !> Removes the dataset created last, so that the file ends after the values of the dataset
-  !> `before`, in three steps that each leave a valid file:
+  !> Removes the most recently created dataset, so that the file ends after the values of the
+  !> dataset `before`. Each of the three steps leaves a valid file:
   !> 1. The link to the dataset is deleted. Its storage is not freed yet, because the dataset is
-  !>   still open.
-  !> 2. The new length of the file is written into its header. HDF5 would write it only after
-  !>   truncating the file.
+  !>    still open.
+  !> 2. The new length of the file is written to its header. HDF5 itself would write this length
+  !>    only after truncating the file.
   !> 3. The dataset is closed, which frees the storage.
   subroutine remove_last(self, name, before)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, before
-    integer(int64), parameter :: header_end = 40  ! position of the file length in the header of an HDF5 file
+    ! offset of the file length in the header of an HDF5 file
+    integer(int64), parameter :: header_end = 40
     integer(hid_t) :: dataset, kept
     integer(hsize_t) :: bytes
     integer(hsize_t), allocatable :: extents(:)
@@ -74,16 +75,16 @@ contains
     call self%flush()
     if (allocated(self%failure)) return
     call write_word(self%path, header_end, int(offset + bytes, int64), done)
-    if (done) call h5dclose_f(dataset, closed)     ! after a failure, closing the dataset would truncate the file
+    if (done) call h5dclose_f(dataset, closed)  ! after a failure, closing the dataset would truncate the file
     call self%check(merge(0, -1, done), "remove "//name)
   end subroutine remove_last
 
-  !> Creates a dataset, and closes it unless it is returned.
+  !> Creates a dataset. The dataset is closed again unless the caller requests it open.
   subroutine make_dataset(self, name, type, extents, opened)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(in) :: type            !! HDF5 type in the file
-    integer(hsize_t), intent(in) :: extents(:)    !! shape of the dataset; an empty array for a single value
+    integer(hsize_t), intent(in) :: extents(:)    !! shape of the dataset; empty for a single value
     integer(hid_t), intent(out), optional :: opened      !! the open dataset; -1 after a failure
     integer(hid_t) :: dataset, space
     integer :: status, closed
@@ -99,15 +100,16 @@ contains
   end subroutine make_dataset
 
   !> Opens a dataset whose values are all stored in this file. Datasets with values in other files
-  !> are refused, because these could be devices or belong to other users. The size of the storage
-  !> is checked, because HDF5 1.10 reads beyond the end of a damaged dataset.
+  !> are refused, because those files could be devices or belong to other users. The storage size is
+  !> checked, because HDF5 1.10 reads beyond the end of a damaged dataset.
   subroutine open_dataset(self, name, dataset, extents, status, like, bytes_each)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(out) :: dataset
     integer(hsize_t), allocatable, intent(out) :: extents(:)
-    integer, intent(out) :: status                !! error status: negative if the dataset does not exist or cannot be used
-    integer(hid_t), intent(in), optional :: like  !! HDF5 type whose class (real, integer or text) the dataset must have
+    integer, intent(out) :: status                !! negative if the dataset does not exist or cannot be used
+    !> HDF5 type whose class (real, integer or text) the dataset must have.
+    integer(hid_t), intent(in), optional :: like
     integer, intent(out), optional :: bytes_each  !! size of one value [bytes]
     integer(hid_t) :: creation, space, type
     integer(hsize_t) :: most(32), shape(32), n, stored
@@ -126,8 +128,8 @@ contains
     if (status >= 0) call h5dget_space_f(dataset, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
     call h5sget_simple_extent_npoints_f(space, n, closed)
-    ! For a dataset without values, HDF5 reports a failure when the number of values or the storage
-    ! size is queried.
+    ! For a dataset without values, HDF5 reports a failure when asked for the number of values or
+    ! the storage size.
     if (closed < 0) n = 0
     if (status >= 0) call h5sget_simple_extent_dims_f(space, shape, most, status)
     call h5sclose_f(space, closed)
@@ -145,11 +147,11 @@ contains
     end if
     call h5tclose_f(type, closed)
     if (status >= 0) extents = shape(:rank)
-    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! the dataset was created without values
+    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! created without values
     if (status < 0) call h5dclose_f(dataset, closed)
   end subroutine open_dataset
 
-  !> Shape of a dataset; [-1] if it does not exist.
+  !> Shape of a dataset; [-1] if the dataset does not exist.
   function extents(self, name, bytes) result(extent)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -164,8 +166,8 @@ contains
     if (status >= 0) call h5dclose_f(dataset, status)
   end function extents
 
-  !> Number of values in a dataset; -1 if it does not exist, or if its stated size exceeds that of
-  !> the largest possible file.
+  !> Number of values in a dataset; -1 if the dataset does not exist, or if its stated size exceeds
+  !> the maximum size of a file.
   function length(self, name) result(n)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -174,7 +176,7 @@ contains
     n = product_of(self%extents(name))
   end function length
 
-  !> Number of values of an array with the given extents; -1 if no file can contain so many.
+  !> Number of values of an array of the given shape; -1 if they would not fit into any file.
   pure function product_of(extents) result(n)
     integer(hsize_t), intent(in) :: extents(:)
     integer(int64) :: n
@@ -183,14 +185,14 @@ contains
     if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
   end function product_of
 
-  !> Transfers a part of an open dataset: writes the values at a memory address to the file, or reads values from the file to a
-  !> memory address. HDF5 can keep small amounts of written values until `flush`.
+  !> Writes values from a memory address to a part of an open dataset, or reads values from there
+  !> into memory. HDF5 may buffer small amounts of written values until `flush`.
   subroutine transfer(self, dataset, first, counts, type, address, writing)
     class(hdf5_file_t), intent(inout) :: self
     integer(hid_t), intent(in) :: dataset
     integer(int64), intent(in) :: first           !! first index along the last dimension, starting at 1
-    !> Number of values along each dimension. The part may be smaller than the dataset only along
-    !> the last dimension.
+    !> Number of values along each dimension. Only along the last dimension may the part be smaller
+    !> than the dataset.
     integer(int64), intent(in) :: counts(:)
     integer(hid_t), intent(in) :: type            !! HDF5 type in memory
     type(c_ptr), intent(in) :: address
@@ -217,7 +219,7 @@ contains
     call h5sclose_f(in_memory, closed)
   end subroutine transfer
 
-  !> Path of an open dataset in its file, without the slash at the beginning.
+  !> Path of an open dataset in its file, without the leading slash.
   function path_of(dataset) result(path)
     integer(hid_t), intent(in) :: dataset
     character(len=:), allocatable :: path
@@ -264,7 +266,7 @@ contains
   subroutine put_text(self, name, text)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, text
-    character(len=:), allocatable, target :: padded     ! allocatable, because a long string would not fit on the stack
+    character(len=:), allocatable, target :: padded     ! allocatable, because the stack may be too small
     integer(hid_t) :: string
     integer :: closed
 
@@ -275,7 +277,7 @@ contains
     call h5tclose_f(string, closed)
   end subroutine put_text
 
-  !> Writes a list of strings, padded with blanks to the length of the longest.
+  !> Writes a list of strings, padded with blanks to the length of the longest string.
   subroutine put_texts(self, name, texts)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -290,7 +292,7 @@ contains
     call h5tclose_f(string, closed)
   end subroutine put_texts
 
-  !> Creates the HDF5 type of strings of fixed length padded with blanks.
+  !> HDF5 type of blank-padded strings of fixed length.
   function string_of(length) result(string)
     integer, intent(in) :: length
     integer(hid_t) :: string
@@ -300,8 +302,8 @@ contains
     call h5tset_size_f(string, int(length, size_t), status)
   end function string_of
 
-  !> Writes a dataset or an attribute, which is created if it is missing; otherwise it must have the
-  !> same number of values.
+  !> Writes a dataset or an attribute. A missing one is created; an existing one must have the same
+  !> number of values.
   subroutine put_values(self, name, extents, stored_as, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -328,11 +330,11 @@ contains
     if (product_of(there) /= product(int(extents, int64))) call self%check(-1, "write "//name)
     if (.not. allocated(self%failure)) call h5dwrite_f(dataset, in_memory, address, status)
     call self%check(status, "write "//name)
-    call h5dclose_f(dataset, status)              ! when a dataset is closed, HDF5 writes its buffered values
+    call h5dclose_f(dataset, status)              ! closing a dataset makes HDF5 write its buffered values
     call self%check(status, "write "//name)
   end subroutine put_values
 
-  !> Writes an attribute of an existing object. A missing attribute is created.
+  !> Writes an attribute of an existing object, and creates the attribute if it is missing.
   subroutine put_attribute(self, name, extents, stored_as, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -374,8 +376,8 @@ contains
     call self%fetch_values(name, n, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
   end subroutine fetch_longs
 
-  !> Reads a dataset or an attribute of n values. If this fails, or if the number or the type of the
-  !> values differs from that of `values`, the latter is left unchanged.
+  !> Reads a dataset or an attribute of n values into memory. If reading fails, or if the file
+  !> contains a different number or type of values, the memory is unchanged.
   subroutine fetch_values(self, name, n, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -403,7 +405,7 @@ contains
       call h5oclose_f(object, closed)
     else
       if (in_memory == h5t_native_double) then
-        call self%open_dataset(name, dataset, extents, status)      ! integers are accepted, because HDF5 converts them
+        call self%open_dataset(name, dataset, extents, status)      ! HDF5 converts integers to reals
       else
         call self%open_dataset(name, dataset, extents, status, like=in_memory)
       end if
@@ -415,7 +417,7 @@ contains
     call self%check(status, "be read: "//name)
   end subroutine fetch_values
 
-  !> Reads a list of strings, truncated or padded to the given length.
+  !> Reads a list of strings, each truncated or padded to the given length.
   subroutine fetch_texts(self, name, length, texts)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name

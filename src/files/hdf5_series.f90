@@ -1,7 +1,8 @@
-!> Series: datasets to which samples are added along the last dimension. The whole storage of a
-!> dataset is allocated when it is created, although the file system uses disk space only for the
-!> part that has been written. After that only values are written. Other programs can therefore read
-!> the file at any time, and it is consistent even if the program is killed.
+!> Time series in an HDF5 file: datasets that grow by one sample at a time along the last dimension.
+!> The whole storage of a series is allocated when the series is created, although the file system
+!> uses disk space only for the parts already written. Afterwards only values are written. Therefore
+!> other programs can read the file at any time, and the file stays consistent even if the program
+!> is killed.
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
@@ -14,19 +15,20 @@ module hdf5_series
   private
   public :: series_t, double_precision, single_precision, short_integer, long_integer
 
-  !> Types of stored values.
+  !> Types of the stored values.
   integer, parameter :: double_precision = 1, single_precision = 2, short_integer = 3, long_integer = 4
   integer, parameter :: bytes_of(4) = [8, 4, 4, 8]
-  integer(int64), parameter :: copied_at_once = 1048576     !! size of the buffer for copying [bytes]
+  integer(int64), parameter :: copied_at_once = 1048576     !! buffer size for copying [bytes]
 
-  !> One series. After the name, the storage type and the shape have been set, the series is created in a new file or located in an
-  !> existing file. From then on its dataset is open until `close`, or until the file that holds it is closed.
+  !> One series. Once its name, storage type and shape are set, the series is created in a new file
+  !> or located in an existing file. Its dataset then stays open until `close`, or until the file
+  !> that holds it is closed.
   type :: series_t
     character(len=96) :: name = ""                !! path of the dataset
     integer :: storage = double_precision
-    integer :: rank = 0                           !! number of dimensions of one sample; 0 for a single number
-    integer :: shape(2) = 1                       !! shape of one sample; unused dimensions have the extent 1
-    integer(int64) :: capacity = 0                !! number of samples that fit into the dataset
+    integer :: rank = 0                           !! number of dimensions of a sample; 0 for a single number
+    integer :: shape(2) = 1                       !! shape of a sample; unused dimensions have the extent 1
+    integer(int64) :: capacity = 0                !! number of samples for which the dataset has space
     integer(hid_t) :: dataset = -1                !! the open dataset
   contains
     procedure :: make
@@ -45,7 +47,7 @@ module hdf5_series
 
 contains
 
-  !> Number of values in one sample.
+  !> Number of values in a sample.
   elemental function width(self)
     class(series_t), intent(in) :: self
     integer :: width
@@ -53,7 +55,7 @@ contains
     width = product(self%shape)
   end function width
 
-  !> Whether the values of the series are integers.
+  !> True if the values of the series are integers.
   elemental function has_integers(self) result(yes)
     class(series_t), intent(in) :: self
     logical :: yes
@@ -61,10 +63,10 @@ contains
     yes = self%storage == short_integer .or. self%storage == long_integer
   end function has_integers
 
-  !> Whether the storage type can represent all given values.
+  !> True if the storage type can represent all given values.
   pure function holds(self, values) result(yes)
     class(series_t), intent(in) :: self
-    integer(int64), intent(in) :: values(:, :)    !! (width,samples)
+    integer(int64), intent(in) :: values(:, :)    !! shape (width, samples)
     logical :: yes
 
     yes = .true.
@@ -79,7 +81,7 @@ contains
     bytes = int(bytes_of(self%storage), int64)*self%width()
   end function bytes_per_sample
 
-  !> HDF5 type of the values in the file.
+  !> HDF5 type of the stored values.
   function storage_type(self) result(type)
     class(series_t), intent(in) :: self
     integer(hid_t) :: type, types(4)
@@ -107,8 +109,8 @@ contains
     call file%make_dataset(trim(self%name), self%storage_type(), int(self%extents(capacity), hsize_t), self%dataset)
   end subroutine make
 
-  !> Locates the series in a file, in which the samples must have the expected shape. Integers may
-  !> have 64 bits in the file even if 32 bits are expected.
+  !> Locates the series in a file, where its samples must have the expected shape. The file may
+  !> contain 64-bit integers even if 32-bit integers are expected.
   subroutine find(self, file)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -127,7 +129,7 @@ contains
     call file%check(merge(0, -1, there), "be read: there is no "//trim(self%name)//" of the expected shape")
   end subroutine find
 
-  !> Closes the dataset. When a dataset is closed, HDF5 writes its buffered values.
+  !> Closes the dataset, which makes HDF5 write its buffered values.
   subroutine close_series(self, file)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -139,14 +141,14 @@ contains
     self%dataset = -1
   end subroutine close_series
 
-  !> Stores samples of reals. The values are converted to single precision by this procedure and not by
-  !> HDF5, because HDF5 would need ten times as long. A single sample in double precision is written
-  !> without a copy, because a sample may be large.
+  !> Stores samples of real numbers. Single-precision values are converted here, because the
+  !> conversion by HDF5 would take ten times as long. A single sample in double precision, which may
+  !> be large, is written without copying it.
   subroutine store_reals(self, file, first, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first           !! number of the first sample, starting at 1
-    real(real64), intent(in), target :: values(:, :)     !! (width,samples)
+    integer(int64), intent(in) :: first           !! index of the first sample, starting at 1
+    real(real64), intent(in), target :: values(:, :)     !! shape (width, samples)
     real(real64), allocatable, target :: doubles(:, :)
     real(real32), allocatable, target :: singles(:, :)
 
@@ -166,8 +168,8 @@ contains
   subroutine store_integers(self, file, first, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first           !! number of the first sample, starting at 1
-    integer(int64), intent(in), target :: values(:, :)   !! (width,samples)
+    integer(int64), intent(in) :: first           !! index of the first sample, starting at 1
+    integer(int64), intent(in), target :: values(:, :)   !! shape (width, samples)
     integer(int32), allocatable, target :: shorts(:, :)
     integer(int64), allocatable, target :: longs(:, :)
 
@@ -183,11 +185,11 @@ contains
     end if
   end subroutine store_integers
 
-  !> Writes samples at a memory address to the file, or reads samples.
+  !> Writes samples from a memory address to the file, or reads samples from the file into memory.
   subroutine pass(self, file, first, count, type, address, writing)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first           !! number of the first sample, starting at 1
+    integer(int64), intent(in) :: first           !! index of the first sample, starting at 1
     integer(int64), intent(in) :: count           !! number of samples
     integer(hid_t), intent(in) :: type            !! HDF5 type in memory
     type(c_ptr), intent(in) :: address
@@ -196,11 +198,11 @@ contains
     call file%transfer(self%dataset, first, self%extents(count), type, address, writing)
   end subroutine pass
 
-  !> Reads one sample and converts its values to double precision.
+  !> Reads one sample as double-precision numbers.
   subroutine load(self, file, number, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: number          !! number of the sample, starting at 1
+    integer(int64), intent(in) :: number          !! index of the sample, starting at 1
     real(real64), intent(inout), target :: values(*)
 
     if (number < 1 .or. number > self%capacity) call file%check(-1, "be read: "//trim(self%name)//" has no sample " &

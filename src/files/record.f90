@@ -1,6 +1,6 @@
-!> A record: a sequence of numbers stored, together with a checksum, in one dataset of an open file.
-!> Depending on the mode, the same sequence of calls counts, writes or reads the numbers, so that
-!> they are always read in the order in which they were written.
+!> Checkpoint records. A record is a sequence of numbers in one dataset, together with a checksum.
+!> The same sequence of calls counts, writes or reads the numbers, depending on the mode, so that
+!> the order of reading always equals the order of writing.
 module record
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_int8_t, c_loc, c_long, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8
@@ -15,7 +15,7 @@ module record
   integer, parameter :: counting = 0, writing = 1, reading = 2
   integer(int64), parameter :: bytes_of_word = 8
 
-  !> A record: a sequence of 64-bit numbers.
+  !> A sequence of 64-bit numbers.
   type :: record_t
     character(len=:), allocatable :: name         !! path of the dataset
     integer :: mode = counting
@@ -35,7 +35,7 @@ module record
     !> CRC-32 checksum from the library zlib, on which HDF5 depends.
     pure function crc32(crc, bytes, length) bind(C) result(continued)
       import :: c_int, c_int8_t, c_long
-      integer(c_long), value :: crc                   !! checksum of the preceding bytes; 0 if there are none
+      integer(c_long), value :: crc                   !! checksum of the preceding bytes; 0 at the beginning
       integer(c_int8_t), intent(in) :: bytes(*)
       integer(c_int), value :: length
       integer(c_long) :: continued
@@ -44,7 +44,7 @@ module record
 
 contains
 
-  !> Checksum of an array of bytes, as eight hexadecimal digits.
+  !> Checksum of an array of bytes, in eight hexadecimal digits.
   pure function checksum(bytes) result(text)
     integer(int8), intent(in) :: bytes(:)
     character(len=8) :: text
@@ -52,7 +52,7 @@ contains
     write (text, "(z8.8)") crc32(0_c_long, bytes, size(bytes, kind=c_int))
   end function checksum
 
-  !> Creates the dataset for a record whose numbers have been counted.
+  !> Creates the dataset of a record once its numbers have been counted.
   subroutine make(self, file)
     class(record_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -63,7 +63,7 @@ contains
     call words%close(file)
   end subroutine make
 
-  !> Returns to the beginning of the record, in order to count, write or read the numbers.
+  !> Returns to the beginning of the record, to count, write or read its numbers.
   subroutine begin(self, mode, file)
     class(record_t), intent(inout) :: self
     integer, intent(in) :: mode
@@ -114,7 +114,7 @@ contains
   end subroutine exchange_longs
 
   !> Writes the checksum at the end of a record, or compares the stored checksum with that of the
-  !> numbers read. If they differ, a failure of the file is recorded.
+  !> numbers read. A difference is recorded as a failure of the file.
   subroutine seal(self, file)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -127,8 +127,8 @@ contains
     call self%series%close(file)
   end subroutine seal
 
-  !> Counts, writes or reads n words of 64 bits, which are stored in memory from `address` on. The
-  !> words are numbers, or components of derived types without padding.
+  !> Counts, writes or reads n words of 64 bits, stored in memory from `address` on. The words are
+  !> numbers, or components of derived types without padding.
   subroutine pass(self, file, address, n)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -1,6 +1,6 @@
-!> Names of the files of a run, derived from the path of the output, OUT.h5, and rules for replacing
-!> and removing files. Only files written by a run may be replaced or removed, and files with
-!> results only with `--force`.
+!> Names of the files of a run, derived from the path of its output OUT.h5, and rules for replacing
+!> and deleting these files. Only files written by a run may be replaced or deleted; files that
+!> contain results require `--force`.
 module run_files
   use errors, only: error_t, exit_files, exit_usage, fail
   use kinds, only: int64
@@ -10,17 +10,20 @@ module run_files
   private
   public :: output_of, is_file, source_of, check_name, check_places, check_replaced, take_final_name
 
-  ! Extensions appended to the name of the output
+  ! Extensions that follow the name of the output
   character(len=*), parameter, public :: &
-    unfinished = ".part", &                       !! extension of the output file during the run
-    unfinished_new = ".part_new", &               !! extension of a new output file until its contents are complete
-    !> extension of the lock file that prevents other runs from writing the same output
+    !> Extension of the output file during the run.
+    unfinished = ".part", &
+    !> Extension of a new output file until it is complete.
+    unfinished_new = ".part_new", &
+    !> extension of the lock file, which prevents other runs from writing the same output
     lock = ".lock"
   character(len=9), parameter :: endings(*) = [character(len=9) :: "", unfinished, unfinished_new, lock]
 
 contains
 
-  !> Path of the output to which an auxiliary file belongs; empty for any other path.
+  !> Path of the output to which an auxiliary file belongs; empty if the path is not an auxiliary
+  !> file.
   pure function output_of(path) result(output)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: output
@@ -34,7 +37,7 @@ contains
     end do
   end function output_of
 
-  !> Whether a path names an existing file, folder or other object.
+  !> True if the path exists, as a file, a folder or another object.
   function is_file(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -42,7 +45,7 @@ contains
     yes = what_is(path) /= "nothing"
   end function is_file
 
-  !> File from which a run is resumed: the unfinished output if it exists, otherwise the finished
+  !> File from which a run is resumed: the unfinished output if there is one, otherwise the finished
   !> output.
   function source_of(output) result(path)
     character(len=*), intent(in) :: output        !! path of the finished output
@@ -61,7 +64,7 @@ contains
       //"for files of the run with the output "//shown(output_of(output))//"; choose another name")
   end subroutine check_name
 
-  !> Reports an error if the run would write to the path of an existing file that no run has written.
+  !> Reports an error if the run would overwrite an existing file that was not written by a run.
   subroutine check_places(output, error)
     character(len=*), intent(in) :: output        !! path of the output
     type(error_t), allocatable, intent(out) :: error
@@ -82,8 +85,8 @@ contains
     end do
   end subroutine check_places
 
-  !> Whether a file begins with the first bytes of an HDF5 file, is empty, or contains only zeros. Empty files and files of zeros
-  !> remain when a run is killed shortly after its start.
+  !> True if a file starts with the signature of HDF5, is empty, or contains only zeros. Empty files
+  !> and files of zeros are left behind by a run that was killed shortly after its start.
   function begins_like_a_run(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -95,10 +98,12 @@ contains
       repeat(achar(0), 8)]))
   end function begins_like_a_run
 
-  !> Reports an error if the file that the finished output would replace is not the file that existed when the run started.
+  !> Reports an error if the file at the output path is no longer the file that was there when the
+  !> run started.
   subroutine check_replaced(output, replaced, error)
     character(len=*), intent(in) :: output        !! path of the output
-    integer(int64), intent(in) :: replaced(:)     !! identity of the file that existed when the run started
+    !> Identity of the file at this path when the run started.
+    integer(int64), intent(in) :: replaced(:)
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: there(3)
 
@@ -111,7 +116,7 @@ contains
   !> Renames a completed output to its final name.
   subroutine take_final_name(output, replaced, error)
     character(len=*), intent(in) :: output        !! path of the output
-    integer(int64), intent(in) :: replaced(:)     !! identity of the file that the output may replace
+    integer(int64), intent(in) :: replaced(:)     !! identity of the file that may be replaced
     type(error_t), allocatable, intent(out) :: error
     logical :: done
 

@@ -1,9 +1,10 @@
-!> A track: a set of series that are sampled together, so that each sample adds values to every series of the track. The frames, the
-!> observables and the event log are tracks. A counter in the file contains the number of complete samples of a track. Readers and
-!> resumed runs can rely on the counter, because the counter is written after the values have been flushed.
+!> Tracks: sets of series that are sampled together, such as the frames, the observables and the
+!> event log. Each sample adds values to all series of its track, and a counter in the file contains
+!> the number of complete samples. The counter is written only after the values have been flushed,
+!> so that readers and resumed runs can rely on it.
 !>
-!> A sample contains the reals and the integers of all series, one series after another. Small samples
-!> are buffered, because one HDF5 call takes as much time as writing a hundred kilobytes.
+!> A sample contains the reals and the integers of all series, one series after another. Small
+!> samples are buffered, because one HDF5 call takes as long as writing a hundred kilobytes.
 module sample_track
   use kinds, only: int64, real64
   use hdf5_objects, only: hdf5_file_t, scalar
@@ -15,23 +16,28 @@ module sample_track
   private
   public :: track_t
 
-  integer(int64), parameter :: batch_bytes = 262144     !! largest total size of samples that are written together [bytes]
-  integer(int64), parameter :: most_in_batch = 512      !! largest number of samples that are written together
-  integer(int64), parameter :: first_bytes = 67108864   !! space that is reserved if the number of samples is unknown [bytes]
-  integer(int64), parameter :: fewest = 16              !! smallest number of samples for which space is reserved
-  integer(int64), parameter :: growth = 4               !! factor by which the capacity increases when the file is full
+  !> Maximum total size of the samples written by one call [bytes].
+  integer(int64), parameter :: batch_bytes = 262144
+  !> Maximum number of samples written by one call.
+  integer(int64), parameter :: most_in_batch = 512
+  !> Space reserved if the number of samples is unknown [bytes].
+  integer(int64), parameter :: first_bytes = 67108864
+  !> Minimum number of samples for which space is reserved.
+  integer(int64), parameter :: fewest = 16
+  integer(int64), parameter :: growth = 4      !! factor by which the capacity of a full file increases
 
   type :: track_t
-    !> The series of the track. If all series of the track share a step and a time, the first two series contain the step and the
-    !> time.
+    !> Series of the track. If all series share a step and a time, the first two series contain
+    !> them.
     type(series_t), allocatable :: series(:)
-    character(len=:), allocatable :: counter            !! path of the dataset that contains the number of complete samples
-    integer(int64) :: planned = 0                       !! number of samples of the whole run; 0 if unknown
-    integer(int64) :: capacity = 0                      !! number of samples that fit into the file
+    character(len=:), allocatable :: counter      !! path of the dataset with the number of complete samples
+    integer(int64) :: planned = 0                       !! number of samples in the whole run; 0 if unknown
+    integer(int64) :: capacity = 0                      !! number of samples for which the file has space
     integer(int64), private :: committed = 0            !! number of complete samples in the file
     integer(int64), private :: waiting = 0              !! number of samples in the buffer
-    real(real64), private :: waiting_since = 0.0_real64 !! time when the oldest sample in the buffer was added [s]
-    type(sample_t), private :: buffer                   !! samples that wait; room for a batch
+    !> Clock time when the oldest buffered sample was added [s].
+    real(real64), private :: waiting_since = 0.0_real64
+    type(sample_t), private :: buffer                   !! buffered samples, with space for a batch
   contains
     procedure :: appended
     procedure :: bytes_per_sample
@@ -50,7 +56,7 @@ module sample_track
 
 contains
 
-  !> Number of samples added so far, whether they are written or still in the buffer.
+  !> Number of samples added so far, both written and buffered.
   elemental function appended(self) result(n)
     class(track_t), intent(in) :: self
     integer(int64) :: n
@@ -66,7 +72,7 @@ contains
     bytes = sum(self%series%bytes_per_sample())
   end function bytes_per_sample
 
-  !> Number of samples that are written together.
+  !> Number of samples written by one call.
   pure function batch(self) result(n)
     class(track_t), intent(in) :: self
     integer(int64) :: n
@@ -74,7 +80,7 @@ contains
     n = max(1_int64, min(most_in_batch, batch_bytes/self%bytes_per_sample()))
   end function batch
 
-  !> Initial capacity in samples.
+  !> Initial capacity, in samples.
   elemental function first_capacity(self) result(n)
     class(track_t), intent(in) :: self
     integer(int64) :: n
@@ -83,8 +89,8 @@ contains
     if (n == 0) n = max(fewest, first_bytes/self%bytes_per_sample())
   end function first_capacity
 
-  !> Capacity required for `count` more samples. A capacity that is too small is multiplied by a factor, so that there is also space
-  !> for later samples.
+  !> Capacity required for `count` more samples. An insufficient capacity is multiplied by a
+  !> constant factor, which leaves space for later samples.
   pure function enlarged(self, count) result(n)
     class(track_t), intent(in) :: self
     integer(int64), intent(in) :: count
@@ -96,8 +102,9 @@ contains
     end do
   end function enlarged
 
-  !> Changes the type of series to 64-bit integers if the given samples contain integers that are too large for 32 bits. The present
-  !> file keeps its types, and the next file that is created contains 64-bit integers.
+  !> Changes the type of a series to 64-bit integers if one of the given samples contains an integer
+  !> too large for 32 bits. The present file keeps its types; the next file created will contain
+  !> 64-bit integers.
   subroutine widen(self, samples, widened)
     class(track_t), intent(inout) :: self
     type(sample_t), intent(in) :: samples
@@ -120,7 +127,7 @@ contains
   subroutine make(self, file, capacity)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: capacity              !! samples
+    integer(int64), intent(in) :: capacity              !! number of samples
     integer :: k
 
     self%capacity = capacity
@@ -132,8 +139,8 @@ contains
     call self%put_counter(file)
   end subroutine make
 
-  !> Creates links from all other H5MD elements to the step and time of the first element, as H5MD prescribes for elements that are
-  !> sampled together.
+  !> Links the step and the time of all H5MD elements to those of the first element, as H5MD
+  !> prescribes for elements that are sampled together.
   subroutine link_step_and_time(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -149,7 +156,8 @@ contains
     end do
   end subroutine link_step_and_time
 
-  !> Locates the series in a file, without changing the file, and continues after the first `count` samples.
+  !> Locates the series in an existing file, which remains unchanged, to continue after the first
+  !> `count` samples.
   subroutine resume(self, file, count)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -171,8 +179,8 @@ contains
     self%committed = count
   end subroutine resume
 
-  !> Writes the number of complete samples to the file. A call of `put_counter` after `resume` makes readers ignore samples that
-  !> were written after the checkpoint.
+  !> Writes the number of complete samples to the file. After `resume`, this call makes readers
+  !> ignore samples that were written after the checkpoint.
   subroutine put_counter(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -180,7 +188,8 @@ contains
     call file%put(self%counter, scalar, [self%committed])
   end subroutine put_counter
 
-  !> Creates the series with a different capacity in a new file and copies all samples that have been written.
+  !> Creates the series with a different capacity in a new file, and copies all samples written so
+  !> far.
   subroutine move(self, file, source, capacity)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file, source
@@ -195,7 +204,8 @@ contains
     end do
   end subroutine move
 
-  !> Checks that the file contains all samples and no unused space; otherwise the procedure records a failure of the file.
+  !> Checks that the file contains all samples and no unused space. A violation is recorded as a
+  !> failure of the file.
   subroutine verify(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -213,8 +223,8 @@ contains
     end do
   end subroutine verify
 
-  !> Appends samples, for which the file must have space. When the number of buffered samples reaches the size of a batch, the
-  !> buffered samples are committed (written to the file).
+  !> Appends samples; the file must have space for them. Full batches of buffered samples are
+  !> committed, that is, written to the file.
   subroutine append(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -234,7 +244,8 @@ contains
     if (self%waiting == self%batch()) call self%flush(file, 0.0_real64)
   end subroutine append
 
-  !> Commits the buffered samples if the oldest buffered sample has waited for at least `least_wait`.
+  !> Commits the buffered samples if the oldest of them has been in the buffer for at least
+  !> `least_wait`.
   subroutine flush_buffer(self, file, least_wait)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -246,7 +257,8 @@ contains
     self%waiting = 0
   end subroutine flush_buffer
 
-  !> Writes samples to the file after the samples that are already complete, flushes the file, and then increases the counter.
+  !> Writes samples to the file after the existing complete samples, flushes the file, and then
+  !> increases the counter.
   subroutine commit(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -1,4 +1,4 @@
-!> Reads tables from HDF5 files.
+!> Implementation of `table_file` with HDF5.
 submodule(table_file) table_in_hdf5
   use kinds, only: int64
   use errors, only: exit_usage, fail
@@ -17,7 +17,7 @@ contains
     real(real64), allocatable, intent(out) :: table(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
-    real(real64), allocatable :: values(:)                     ! the values of a dataset, row by row
+    real(real64), allocatable :: values(:)                     ! values of a dataset, row by row
     integer(int64) :: length
     integer :: k, n, first
 

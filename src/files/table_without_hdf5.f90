@@ -1,4 +1,5 @@
-!> Reports that tables in HDF5 files cannot be read. This submodule is part of libricochet.so, the library without HDF5.
+!> Implementation of `table_file` without HDF5, for libricochet.so. It reports that tables in HDF5
+!> files cannot be read.
 submodule(table_file) table_without_hdf5
   use errors, only: exit_usage, fail
   implicit none
