@@ -1,10 +1,11 @@
-!> Checkpoints: the present state of a simulation and the progress of its output, stored in the output file. A resumed run is
-!> bit-identical to an uninterrupted one.
+!> Checkpoints: the state of a simulation and the progress of its output, stored in the output file.
+!> A resumed run is bit-identical to an uninterrupted one.
 !>
-!> During a run the output file has two slots: datasets with space for one checkpoint each, one of which is valid. A new checkpoint,
-!> with a checksum, is written to the other slot; when it has reached the disk, a number in the file is changed to make this slot
-!> the valid one. The file therefore contains a complete checkpoint at all times. The output of a finished run has one slot. The
-!> output of an aborted run contains no valid checkpoint.
+!> During a run the output file has two slots, each with space for one checkpoint; one of them is
+!> valid. A new checkpoint and its checksum are written to the other slot. Once they are on disk, a
+!> number in the file is changed to make this slot the valid one, so the file always contains a
+!> complete checkpoint. The output of a finished run has one slot; the output of an aborted run
+!> contains no valid checkpoint.
 module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int64
@@ -30,19 +31,20 @@ module checkpoint
   public :: put_checkpoint, put_last_checkpoint, read_checkpoint, recall_overrides, recall_input
 
   character(len=*), parameter :: slots(2) = checkpoint_group//["1", "2"]
-  character(len=*), parameter :: current = checkpoint_group//"current"     !! number of the valid slot, or `none`
+  character(len=*), parameter :: current = checkpoint_group//"current"  !! number of the valid slot, or `none`
   integer, parameter :: none = 0
   character(len=*), parameter :: described = checkpoint_group//"input_checksum"
 
-  !> Path of a hard link to the first slot, created after all other links of the file and never deleted. HDF5 deletes the last link
-  !> of a group in two steps, overwriting its name before it removes the link from a list; if the program were killed in between,
-  !> h5dump could not list the file.
+  !> Path of an additional hard link to the first slot, created after all other links of the file
+  !> and never deleted. HDF5 deletes the last link of a group in two steps: it overwrites the name,
+  !> then removes the link from a list. If the program were killed between these steps, h5dump could
+  !> not list the file.
   character(len=*), parameter :: kept = checkpoint_group//"kept"
 
 contains
 
-  !> Identifies the program: the version of the checkpoint layout, and those compiler flags that permit inexact arithmetic and can
-  !> therefore change results.
+  !> Identification of the program that can resume the run: the version of the checkpoint layout,
+  !> and those compiler flags that allow inexact arithmetic and can therefore change results.
   pure function program() result(text)
     character(len=:), allocatable :: text
 
@@ -51,7 +53,8 @@ contains
     if (index(build_flags, "-ffast-math") + index(build_flags, "-Ofast") > 0) text = text//", fast math"
   end function program
 
-  !> Text of the input that the run uses, with one variable per line, without variables that may change on `--resume`.
+  !> The input that the run uses, with one variable per line. Variables that may change on
+  !> `--resume` are left out.
   pure function fixed_input(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -60,7 +63,7 @@ contains
 
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
-        if (groups(g)%values(k)%name == "relative_to") cycle           ! not needed, because mass and radius have final values
+        if (groups(g)%values(k)%name == "relative_to") cycle           ! unneeded: masses and radii are final
         if (.not. groups(g)%values(k)%is_set() .or. table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add(groups(g)%value_line(k)//eol)
       end do
@@ -68,7 +71,8 @@ contains
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
-        if (size(groups(g)%values(k)%reals) <= most_written) cycle  ! `value_line` contains all values of a short list
+        ! `value_line` contains all values of a short list
+        if (size(groups(g)%values(k)%reals) <= most_written) cycle
         if (table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
@@ -77,14 +81,16 @@ contains
     text = growing%text()
   end function fixed_input
 
-  !> Adds the overrides of the original run, so that users need not repeat them on `--resume`, except overrides of variables that
-  !> may change on `--resume`; overrides of changes are included.
+  !> Restores the overrides of the original run, including overrides of scheduled changes, so that
+  !> users need not repeat them on `--resume`. Overrides of variables that may change on `--resume`
+  !> are not restored.
   subroutine recall_overrides(output, overrides, error)
     character(len=*), intent(in) :: output                       !! path of the output
-    !> Overrides of the present command line, in the form GROUP.VARIABLE=VALUE, before which those from the output file are
-    !> inserted.
+    !> Overrides on the present command line, in the form GROUP.VARIABLE=VALUE. The overrides in the
+    !> output file are inserted before them.
     type(text_t), allocatable, intent(inout) :: overrides(:)
-    !> Error if another version of the program wrote the output, or if the text of the input in it is damaged.
+    !> Set if another version of the program wrote the output, or if the stored text of the input is
+    !> damaged.
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     type(text_t) :: override
@@ -96,7 +102,7 @@ contains
     call file%open(source_of(output), writable=.false.)
     call file%fetch_text(parameters_group//"overrides", text)
     if (checkpoint_number(file) /= none) then
-      call check_program(file, error)                         ! another version may have other names of variables
+      call check_program(file, error)                         ! another version may use other variable names
       if (.not. allocated(error)) call check_description(file, error)
     end if
     call file%close()
@@ -114,12 +120,13 @@ contains
     overrides = [overrides, given]
   end subroutine recall_overrides
 
-  !> Reads the texts of the input from an output file, checking that they are undamaged and were written by this version of the
-  !> program.
+  !> Reads the text of the input from an output file and checks that it is undamaged and was written
+  !> by this version of the program.
   subroutine recall_input(file, text, overrides, changes, error)
     type(hdf5_file_t), intent(inout) :: file
     character(len=:), allocatable, intent(out) :: text, overrides
-    character(len=:), allocatable, intent(out) :: changes         !! changes that the text contains; not allocated if there are none
+    !> Changes in the text; not allocated if there are none.
+    character(len=:), allocatable, intent(out) :: changes
     type(error_t), allocatable, intent(out) :: error
 
     text = ""
@@ -132,7 +139,8 @@ contains
     call check_description(file, error)
   end subroutine recall_input
 
-  !> Reports an error if the texts of the input in the file have been changed since the run wrote them.
+  !> Reports an error if the text of the input in the file was modified after the run had written
+  !> it.
   subroutine check_description(file, error)
     type(hdf5_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error
@@ -143,7 +151,7 @@ contains
     call file%report(error)
   end subroutine check_description
 
-  !> Checksum of the texts that describe the input in an output file.
+  !> Checksum of the texts in an output file that describe the input.
   function description_checksum(file) result(text)
     type(hdf5_file_t), intent(inout) :: file
     character(len=8) :: text
@@ -156,7 +164,7 @@ contains
     text = checksum(transfer(input//eol//overrides//eol//changes, [0_int8]))
   end function description_checksum
 
-  !> Name of the variable that an override sets.
+  !> Name of the variable in an override.
   pure function variable_of(override) result(name)
     character(len=*), intent(in) :: override
     character(len=:), allocatable :: name
@@ -164,7 +172,7 @@ contains
     name = lower_case(trim(adjustl(override(:index(override//"=", "=") - 1))))
   end function variable_of
 
-  !> Creates both slots in a new file and writes a checkpoint of the present state to each slot.
+  !> Creates both slots in a new file and writes a checkpoint of the present state to each.
   subroutine make_checkpoints(file, groups, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -180,7 +188,8 @@ contains
     call file%link(slots(1), kept)
   end subroutine make_checkpoints
 
-  !> Copies both slots of another file into a new one, in the order of `make_checkpoints`, on which `remove_last` depends.
+  !> Copies both slots to a new file, in the same order as `make_checkpoints`; `remove_last` depends
+  !> on this order.
   subroutine copy_checkpoints(file, source)
     type(hdf5_file_t), intent(inout) :: file
     type(hdf5_file_t), intent(inout) :: source
@@ -206,7 +215,7 @@ contains
     call file%link(slots(1), kept)
   end subroutine copy_checkpoints
 
-  !> Writes a checkpoint to the invalid slot, and marks it as valid once it has reached the disk.
+  !> Writes a checkpoint to the invalid slot, which becomes valid as soon as the data are on disk.
   subroutine put_checkpoint(file, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -241,7 +250,8 @@ contains
     call file%put(current, scalar, [int(none, int64)])
   end subroutine mark_as_broken
 
-  !> Number of the valid slot; `none` if no slot is valid, and -1 if the file does not contain this number.
+  !> Number of the valid slot; `none` if no slot is valid, -1 if the file does not contain the
+  !> number.
   function checkpoint_number(file) result(number)
     type(hdf5_file_t), intent(inout) :: file
     integer :: number
@@ -252,7 +262,7 @@ contains
     number = int(there(1))
   end function checkpoint_number
 
-  !> Whether a file contains the second of the two slots for checkpoints.
+  !> True if a file contains both slots for checkpoints.
   function has_both_checkpoints(file) result(yes)
     type(hdf5_file_t), intent(inout) :: file
     logical :: yes
@@ -260,7 +270,7 @@ contains
     yes = file%length(slots(2)) > 0
   end function has_both_checkpoints
 
-  !> Whether an unfinished output was written by an aborted run.
+  !> True if an unfinished output was written by an aborted run.
   function has_broken_off(output) result(yes)
     character(len=*), intent(in) :: output        !! path of the finished output
     logical :: yes
@@ -283,7 +293,7 @@ contains
     bytes = 8*record%words
   end function checkpoint_bytes
 
-  !> Writes a checkpoint to a slot, and creates the slot if it does not exist.
+  !> Writes a checkpoint to a slot; a missing slot is created.
   subroutine put_slot(file, name, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: name
@@ -302,14 +312,15 @@ contains
     call exchange_all(file, record, sim, copy)
   end subroutine put_slot
 
-  !> Restores a run from its finished or unfinished output. `progress` returns the number of samples that the output contained at
-  !> the time of the checkpoint.
+  !> Restores a run from its finished or unfinished output. On return, `progress` contains the
+  !> numbers of samples in the output at the time of the checkpoint.
   subroutine read_checkpoint(output, input, sim, progress, finished, error)
     character(len=*), intent(in) :: output      !! path of the finished output
     type(run_input_t), intent(in) :: input
-    type(simulation_t), intent(inout) :: sim    !! on entry, a simulation with the box, contact law and species of the input
+    !> On entry, a simulation with the box, contact law and species of the input.
+    type(simulation_t), intent(inout) :: sim
     type(progress_t), intent(out) :: progress
-    logical, intent(out) :: finished            !! .true. if the run had already finished
+    logical, intent(out) :: finished            !! .true. if the run had finished
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     character(len=:), allocatable :: source
@@ -337,7 +348,8 @@ contains
     call progress%schedule%look_ahead(sim)
   end subroutine read_checkpoint
 
-  !> Reports changes that differ from those already made by the run, and changes whose time has passed.
+  !> Reports an error if the scheduled changes before the checkpoint differ from those that the run
+  !> has made, or if a later change has a time that has already passed.
   subroutine check_changes(sim, path, error)
     type(simulation_t), intent(in) :: sim
     character(len=*), intent(in) :: path
@@ -355,7 +367,7 @@ contains
     end if
   end subroutine check_changes
 
-  !> Reads the valid checkpoint or, if it is damaged, that in the other slot.
+  !> Reads the valid checkpoint or, if it is damaged, the one in the other slot.
   subroutine read_slot(file, sim, progress, error)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
@@ -363,7 +375,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(record_t) :: record
     type(simulation_t) :: blank
-    character(len=:), allocatable :: failure      ! why the valid checkpoint could not be read
+    character(len=:), allocatable :: failure      ! reason why the valid checkpoint could not be read
     integer(int64) :: words
     integer :: number, trial
 
@@ -406,7 +418,8 @@ contains
     if (.not. allocated(error)) call file%report(error)
   end subroutine check_program
 
-  !> Reports an error if the checkpoint was written by another version of the program or belongs to a different input.
+  !> Reports an error if another version of the program wrote the checkpoint, or if it belongs to a
+  !> different input.
   subroutine check_origin(file, groups, error)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)

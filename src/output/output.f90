@@ -1,9 +1,10 @@
-!> Output of a run: decides when samples are written, and manages the output file. During the run the file is called OUT.h5.part,
-!> and a lock file prevents other runs from writing to it; OUT.h5 is the file of a finished run.
+!> Output of a run: decides when samples are written, and manages the output file. The file is
+!> called OUT.h5.part during the run and OUT.h5 once the run has finished. A lock file prevents
+!> other runs from writing to the same output.
 !>
-!> The layout of an output file never changes after its creation. If the number of samples is known at the start, the file has
-!> exactly enough space. Otherwise, whenever the space is used up, an atomic renaming replaces it by a larger file. At the end of
-!> the run it is replaced by a copy without unused space.
+!> The layout of an output file never changes after its creation. If the number of samples is known
+!> at the start, the file has exactly the space required. Otherwise a full file is replaced by a
+!> larger one, by an atomic renaming, and at the end of the run by a copy without unused space.
 module output
   use kinds, only: int64, never, real64
   use sampling_schedule, only: frames, progress_t, values
@@ -31,25 +32,30 @@ module output
   private
   public :: estimate_size, output_t
 
-  real(real64), parameter :: longest_wait = 0.05_real64  !! longest time that a sample waits in a buffer while the run is active [s]
-  integer, parameter :: events = 3              !! index of the track of the event log, which follows `frames` and `values`
-  !> Treatment of the checkpoints when a new file replaces the old one: copied (`kept`), written for the present state (`anew`), or
-  !> omitted (`dropped`).
+  !> Maximum time for which a sample is buffered during a run [s].
+  real(real64), parameter :: longest_wait = 0.05_real64
+  !> Index of the event log in the list of tracks, after `frames` and `values`.
+  integer, parameter :: events = 3
+  !> Treatment of the checkpoints when a new file replaces the old one: copied (`kept`), written for
+  !> the present state (`anew`), or omitted (`dropped`).
   integer, parameter :: kept = 1, anew = 2, dropped = 3
 
   type :: output_t
     type(progress_t) :: progress
     character(len=:), allocatable :: path         !! path of the finished file
-    type(run_input_t) :: input                    !! the input that the file describes
+    type(run_input_t) :: input                    !! input described in the file
     type(hdf5_file_t), allocatable, private :: file
-    type(track_t), allocatable, private :: track(:)      !! (2 or 3) tracks of frames, observables and, if requested, events
+    !> Tracks of frames, observables and, if requested, events: 2 or 3 elements.
+    type(track_t), allocatable, private :: track(:)
     type(frame_column_t), allocatable, private :: columns(:)  !! columns of the frames
-    !> Whether to expect a copy of the file, without unused space, at the end of the run
+    !> Whether the file is expected to be copied, without its unused space, at the end of the run.
     logical, private :: is_copied = .true.
     type(lock_t), private :: lock
-    integer(int64), private :: replaced(3) = 0_int64     !! identity of the file that existed at `path` when the run started
-    real(real64), private :: opened = 0.0_real64  !! time when this part of the run started, on the clock `seconds` [s]
-    real(real64), private :: spent = 0.0_real64   !! wall time of earlier parts of the run [s]
+    !> Identity of the file that existed at `path` when the run started.
+    integer(int64), private :: replaced(3) = 0_int64
+    !> Clock time when this part of the run started [s].
+    real(real64), private :: opened = 0.0_real64
+    real(real64), private :: spent = 0.0_real64   !! wall time of the earlier parts of the run [s]
   contains
     procedure :: claim
     procedure :: open => open_output
@@ -67,8 +73,8 @@ module output
 
 contains
 
-  !> Creates the folders of the output, acquires its lock, and reports files that must not be
-  !> overwritten.
+  !> Creates the folders of the output, acquires its lock, and reports an error if a file must not
+  !> be overwritten.
   subroutine claim(self, path, error)
     class(output_t), intent(inout) :: self
     character(len=*), intent(in) :: path          !! path of the finished file
@@ -76,7 +82,7 @@ contains
     character(len=:), allocatable :: problem
     logical :: made
 
-    call record_signals()                         ! from here on, killing the program can lose data
+    call record_signals()                         ! from here on, killing the program could lose data
     self%file = hdf5_file_t()
     self%path = path
     self%opened = seconds()
@@ -90,7 +96,7 @@ contains
       if (problem /= "") call fail(error, exit_files, path//": "//problem)
     end if
     if (.not. allocated(error)) call check_places(path, error)
-    ! A file with the extension `unfinished_new` is incomplete: the run that wrote it was killed.
+    ! A file with the extension `unfinished_new` is incomplete and was left behind by a killed run.
     if (.not. allocated(error)) call remove_file(path//unfinished_new)
     self%replaced = identity_of(path)
     if (is_file(path) .and. all(self%replaced == 0) .and. .not. allocated(error)) &
@@ -102,12 +108,12 @@ contains
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim
-    !> .true. allows the run to replace an unfinished output now, and a finished output at the end
-    !> of the run
+    !> .true. allows the run to replace an unfinished output at its start, and a finished output at
+    !> its end.
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
-    !> .true. to reserve space only for the first samples, because another run will write all later
-    !> ones
+    !> .true. reserves space only for the first samples; all later samples are then written by
+    !> another run.
     logical, intent(in), optional :: only_start
     integer :: k
 
@@ -136,7 +142,8 @@ contains
     if (allocated(error)) call self%file%discard()
   end subroutine open_output
 
-  !> Reports an error if a new run would replace a finished output, or an unfinished output that can still be resumed.
+  !> Reports an error if a new run would replace a finished output, or an unfinished output from
+  !> which a run can still be resumed.
   subroutine check_start(self, error)
     class(output_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -151,7 +158,8 @@ contains
     end if
   end subroutine check_start
 
-  !> Reports an error if there is not enough space for the output and for its copy at the end of the run.
+  !> Reports an error if the disk has too little space for the output and for its copy at the end of
+  !> the run.
   subroutine check_room(self, sim, error)
     class(output_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -172,9 +180,10 @@ contains
     end if
   end subroutine check_room
 
-  !> Opens the output of a resumed run after `claim`. New samples follow those written before the checkpoint. A finished output
-  !> stays unchanged until the continued run has finished. A new file is written if the input differs from its description in the
-  !> old file, or if the old file has less space than a new run would reserve.
+  !> Opens the output of a resumed run after `claim`. New samples follow those written before the
+  !> checkpoint, and later samples are overwritten. A finished output is left unchanged until the
+  !> continued run has finished. The run writes to a new file if the old file describes a different
+  !> input or has less space than a new run would reserve.
   subroutine resume(self, input, sim, progress, finished, error)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -208,7 +217,8 @@ contains
     fits = .not. finished
     if (fits) fits = describes(self%file, input)
     if (fits) fits = has_both_checkpoints(self%file)
-    if (fits) fits = all(self%track%capacity >= self%track%first_capacity())   ! .false. for a saved simulation in memory
+    ! .false. for a saved simulation in memory
+    if (fits) fits = all(self%track%capacity >= self%track%first_capacity())
     if (.not. fits) then
       call self%check_room(sim, error)
       if (allocated(error)) return
@@ -222,7 +232,7 @@ contains
     call self%file%report(error)
   end subroutine resume
 
-  !> Sets up the tracks and the planned number of samples of each track.
+  !> Sets up the tracks and the planned number of samples of each.
   subroutine plan(self, input, sim)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -245,13 +255,14 @@ contains
         self%track(events)%planned = planned_events(rule%limits)
       end if
       self%is_copied = any(self%track%planned == 0)
-      ! Collisions with boundaries are logged, too, but do not count as collisions of two disks.
+      ! Collisions with boundaries are also logged, but do not count as disk–disk collisions.
       if (settings%event_log) self%is_copied = self%is_copied .or. (rule%limits%collisions < huge(0_int64) &
         .and. (sim%box%has_obstacles() .or. .not. all(sim%box%periodic)))
     end associate
   end subroutine plan
 
-  !> Smallest number of events in the log of a run that ends at a number of events or collisions; 0 if another rule can end the run.
+  !> Smallest possible number of logged events of a run that ends at a number of events or
+  !> collisions; 0 if another stop rule can end the run.
   pure function planned_events(limits) result(n)
     type(limits_t), intent(in) :: limits          !! limits of the run
     integer(int64) :: n
@@ -262,7 +273,7 @@ contains
     if (n == huge(n)) n = 0
   end function planned_events
 
-  !> Whether the size of the output is known only without the event log.
+  !> True if only the size of the event log is unknown before the run.
   pure function lacks_log(self) result(yes)
     class(output_t), intent(in) :: self
     logical :: yes
@@ -271,19 +282,20 @@ contains
     if (yes) yes = self%track(events)%planned == 0
   end function lacks_log
 
-  !> Smallest possible size of the file, in bytes. If the number of samples is unknown, only the
-  !> first and the last are counted.
+  !> Minimum size of the file in bytes. If the number of samples is unknown, the first and the last
+  !> sample are counted.
   function bytes_of_file(self, sim) result(bytes)
     class(output_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
     integer(int64) :: bytes
-    real(real64), parameter :: constants = 24.0_real64    !! size of id, species, mass and radius of a disk [bytes]
+    !> Size of id, species, mass and radius per disk [bytes].
+    real(real64), parameter :: constants = 24.0_real64
 
     bytes = int(min(9.0e18_real64, constants*sim%n_disks() + 2*checkpoint_bytes(sim) &
       + sum(real(max(self%track%planned, 2_int64), real64)*real(self%track%bytes_per_sample(), real64))), int64)
   end function bytes_of_file
 
-  !> Estimates the smallest possible size of the output of a run.
+  !> Estimates the minimum size of the output of a run.
   subroutine estimate_size(input, sim, bytes, text)
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim      !! unchanged on return
@@ -298,7 +310,7 @@ contains
     if (output%lacks_log()) text = text//" without the event log"
   end subroutine estimate_size
 
-  !> Creates a file with a temporary name and writes everything except tracks and checkpoints.
+  !> Creates a file with a temporary name and writes all data except samples and checkpoints.
   subroutine create_file(self, file, sim)
     class(output_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -310,7 +322,7 @@ contains
     call file%put(wall_time, scalar, [self%spent])
   end subroutine create_file
 
-  !> Lowers the limits of the simulation, so that it stops when the next sample is due.
+  !> Lowers the limits of the simulation, so that it pauses when the next sample is due.
   pure subroutine tighten(self, limits)
     class(output_t), intent(in) :: self
     type(limits_t), intent(inout) :: limits
@@ -319,8 +331,8 @@ contains
     call self%progress%schedule(values)%tighten(limits)
   end subroutine tighten
 
-  !> Takes the samples that are due. The main loop calls this whenever the simulation has stopped at
-  !> a limit.
+  !> Takes all samples that are due. The main loop calls this procedure whenever the simulation
+  !> pauses at a limit.
   subroutine take_due_samples(self, sim, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -336,7 +348,7 @@ contains
     call self%file%report(error)
   end subroutine take_due_samples
 
-  !> Adds a frame, or a sample of the observables, to the output.
+  !> Adds a frame or a sample of the observables to the output.
   subroutine take_sample(self, track, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track                  !! `frames` or `values`
@@ -349,8 +361,8 @@ contains
     end associate
   end subroutine take_sample
 
-  !> Moves the events in the event log to the output, and empties the log. A failure of the output
-  !> is reported by the next call of `take_due_samples`.
+  !> Moves the logged events to the output. A failure of the output is reported by the next call of
+  !> `take_due_samples`.
   subroutine take_events(self, sim, log)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -362,8 +374,8 @@ contains
     log%n = 0
   end subroutine take_events
 
-  !> Adds samples to a track, after replacing the file by a larger one if there is no space for
-  !> them.
+  !> Adds samples to a track. If the file has no space for them, it is first replaced by a larger
+  !> file.
   subroutine add(self, track, samples, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track
@@ -379,8 +391,8 @@ contains
     call self%track(track)%append(self%file, samples)
   end subroutine add
 
-  !> Commits (writes to the file) all buffered samples, or those that have been in a buffer for at
-  !> least `least_wait`.
+  !> Commits buffered samples, that is, writes them to the file: all of them, or only those buffered
+  !> for at least `least_wait`.
   subroutine flush_buffers(self, least_wait)
     class(output_t), intent(inout) :: self
     real(real64), intent(in), optional :: least_wait      !! [s]
@@ -394,12 +406,12 @@ contains
     end do
   end subroutine flush_buffers
 
-  !> Replaces the file by a new one in which the tracks have different capacities.
+  !> Replaces the file by a new one with different capacities of the tracks.
   subroutine rebuild(self, capacities, sim, checkpoints)
     class(output_t), intent(inout) :: self
     integer(int64), intent(in) :: capacities(:)
     type(simulation_t), intent(inout) :: sim
-    !> Treatment of the checkpoints, one of the constants `kept`, `anew` and `dropped`
+    !> `kept`, `anew` or `dropped`
     integer, intent(in) :: checkpoints
     type(hdf5_file_t), allocatable :: new
     integer(int64) :: needed
@@ -441,8 +453,8 @@ contains
     call self%file%report(error)
   end subroutine save
 
-  !> Completes the output of a finished run: checks the file and gives it its final name. If this fails, the run can be resumed from
-  !> the checkpoint written just before.
+  !> Completes the output of a finished run: checks the file and renames it to its final name. If
+  !> this fails, the run can be resumed from the checkpoint written just before.
   subroutine finish(self, sim, cost, note, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -466,13 +478,14 @@ contains
     if (.not. allocated(error)) call self%release()
   end subroutine finish
 
-  !> Writes the last samples, removes unused space, and records how the run ended. Samples taken only because of the end are not
-  !> counted in the final checkpoint, so that a continued run overwrites them.
+  !> Writes the last samples, removes unused space, and records why the run ended. Samples taken
+  !> only because the run ends are not counted in the final checkpoint, so that a continued run
+  !> overwrites them.
   subroutine write_end(self, sim, cost, note, broken)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    !> Three values for the present part of the run: wall time [s], collisions per processor time [1/s], and number of events that
-    !> the serial engine executed
+    !> Wall time [s], collisions per processor time [1/s], and number of events executed by the
+    !> serial engine, in the present part of the run.
     real(real64), intent(in) :: cost(3)
     character(len=*), intent(in) :: note          !! reason why the run ended, if no stop rule was met
     logical, intent(in) :: broken
@@ -490,20 +503,20 @@ contains
     if (.not. broken) call put_last_checkpoint(self%file, sim, before)
   end subroutine write_end
 
-  !> Completes the output of an aborted run, including its last state. The file keeps the name of an
+  !> Completes the output of an aborted run, including the last state. The file keeps the name of an
   !> unfinished output, OUT.h5.part.
   subroutine break_off(self, sim, cost, note)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: cost(3)           !! see `write_end`
-    character(len=*), intent(in) :: note          !! reason
+    character(len=*), intent(in) :: note          !! reason for aborting the run
     type(error_t), allocatable :: uncountable
 
     call check_counts(sim, uncountable)
     if (.not. allocated(uncountable)) call self%write_end(sim, cost, note, broken=.true.)
   end subroutine break_off
 
-  !> Closes the finished or unfinished output file, and removes the lock file.
+  !> Closes the output file, finished or not, and deletes the lock file.
   subroutine release(self)
     class(output_t), intent(inout) :: self
 

@@ -10,16 +10,17 @@ module progress_line
   private
   public :: progress_line_t
 
-  integer, parameter :: window = 20                !! number of reports over which rates are averaged
+  !> Number of reports over which rates are averaged.
+  integer, parameter :: window = 20
 
   type, extends(status_line_t) :: progress_line_t
     private
-    real(real64) :: started = 0.0_real64           !! time when the program started [s]
+    real(real64) :: started = 0.0_real64           !! clock time when the program started [s]
     integer :: n = 0                               !! number of reports so far
-    ! Circular buffers of the values at each of the last reports
+    ! Circular buffers with the values at the most recent reports
     real(real64) :: clock(0:window - 1) = 0.0_real64       !! clock time [s]
     real(real64) :: share(0:window - 1) = 0.0_real64       !! completed fraction of the run
-    integer(int64) :: collisions(0:window - 1) = 0_int64   !! number of collisions of disks
+    integer(int64) :: collisions(0:window - 1) = 0_int64   !! number of disk–disk collisions
     integer(int64) :: events(0:window - 1) = 0_int64       !! number of events
   contains
     procedure :: start
@@ -29,19 +30,19 @@ module progress_line
 
 contains
 
-  !> Prepares the reports for a run, or for the next part of a run.
+  !> Starts the reports of a run, or of the next part of a run.
   subroutine start(self, sim, stop_rule, started)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
-    real(real64), intent(in) :: started            !! time when the program started [s]
+    real(real64), intent(in) :: started            !! clock time when the program started [s]
 
     self%started = started
     self%n = 0
     call remember(self, sim, stop_rule)
   end subroutine start
 
-  !> Shows a progress report if a report is due.
+  !> Displays a progress report if one is due.
   subroutine report(self, sim, stop_rule)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -64,21 +65,21 @@ contains
     call self%show(trim(line))
   end subroutine report
 
-  !> Whether almost all events between two reports were bounces on walls that dissipate energy, under
-  !> gravity.
+  !> True if, under gravity, almost all events between two reports were bounces on dissipative
+  !> walls.
   pure function bounces(self, sim, first, last) result(yes)
     class(progress_line_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
-    integer, intent(in) :: first, last                !! positions of the earlier and the later report in the buffers
+    integer, intent(in) :: first, last                !! buffer positions of the two reports, earlier first
     logical :: yes
-    integer(int64), parameter :: many = 100           ! number of events per collision
+    integer(int64), parameter :: many = 100           ! minimum ratio of events to collisions
 
     yes = sim%n_disks() > 1 .and. sim%box%has_gravity() .and. sim%box%has_lossy_walls() &
       .and. self%events(last) - self%events(first) > many*(1 + self%collisions(last) - self%collisions(first))
   end function bounces
 
-  !> Records the present time, the completed fraction of the run and the numbers of collisions and
-  !> events. A report calculates rates from the difference to an earlier record.
+  !> Stores the time, the completed fraction, and the numbers of collisions and events. Rates are
+  !> calculated from the differences between two such records.
   subroutine remember(self, sim, stop_rule)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -93,7 +94,7 @@ contains
     self%n = self%n + 1
   end subroutine remember
 
-  !> Converts a number of seconds to the form h:mm:ss.
+  !> Formats a duration in seconds as h:mm:ss.
   pure function clock_text(s) result(text)
     real(real64), intent(in) :: s
     character(len=:), allocatable :: text

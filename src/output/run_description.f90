@@ -1,4 +1,5 @@
-!> Writes the constant contents of an output file: format and author, box, disks, all parameters, and provenance.
+!> Writes the constant contents of an output file: format and author, box, disks, all parameters,
+!> and provenance.
 module run_description
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: compiler_version
@@ -22,13 +23,14 @@ module run_description
   private
   public :: describe_end, describe_run, describes
 
-  !> Largest number of values in an attribute, because HDF5 limits attributes to 64 kB.
+  !> Maximum number of values in an attribute, because HDF5 limits attributes to 64 kB.
   integer, parameter :: longest_attribute = 1000
-  integer, parameter :: longest_note = 500            !! largest length of the text that states why the run ended
+  !> Maximum length of the stated reason why the run ended.
+  integer, parameter :: longest_note = 500
 
 contains
 
-  !> Writes all datasets that are not time series; values known only at the end of the run are
+  !> Writes all datasets that are not time series. Values known only at the end of the run are
   !> written as placeholders.
   subroutine describe_run(file, input, sim)
     type(hdf5_file_t), intent(inout) :: file
@@ -53,7 +55,7 @@ contains
     call describe_end(file, input%settings%run%threads, 0.0_real64, [0.0_real64, 0.0_real64], "")
   end subroutine describe_run
 
-  !> Writes the version of the format, the author and the creator, as H5MD requires.
+  !> Writes the format version, the author and the creator, as required by H5MD.
   subroutine describe_format(file)
     type(hdf5_file_t), intent(inout) :: file
 
@@ -100,7 +102,7 @@ contains
     call file%put(disk_radius, [size(sizes)], sizes)
   end subroutine describe_disks
 
-  !> Writes the text of the input, and the value of every variable that the run uses.
+  !> Writes the text of the input and the value of every variable used in the run.
   subroutine describe_input(file, input)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input
@@ -133,8 +135,8 @@ contains
     if (changes /= "") call file%put(changes_at_work, changes)
   end subroutine describe_input
 
-  !> Writes the dimension and the number of particles, which the thermodynamics module of H5MD requires for each group of
-  !> observables.
+  !> Writes the dimension and the number of particles for each group of observables, as required by
+  !> the thermodynamics module of H5MD.
   subroutine describe_populations(file, sim)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(in) :: sim
@@ -149,11 +151,12 @@ contains
       if (s > 0) n = sim%species(s)%count
       call file%make_group(group)
       call file%put(group//"@dimension", scalar, [2_int32])
-      if (.not. sim%features%open) call file%put(group//"/particle_number", scalar, [n])    ! otherwise an observable
+      ! in an open system an observable
+      if (.not. sim%features%open) call file%put(group//"/particle_number", scalar, [n])
     end do
   end subroutine describe_populations
 
-  !> Writes data about the build of the program and the computer that created the file.
+  !> Writes how the program was built and on which computer the file was created.
   subroutine describe_origin(file, input)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input
@@ -168,7 +171,7 @@ contains
     call file%put(provenance//"@host", host_name())
   end subroutine describe_origin
 
-  !> Name of the user, from the environment variables.
+  !> User name, from the environment variables.
   function author() result(name)
     character(len=:), allocatable :: name
     integer :: length
@@ -179,10 +182,11 @@ contains
     if (name == "") name = "unknown"
   end function author
 
-  !> Whether a variable has no influence on the results of a run. Only `run.threads` has none, and is therefore not among the
-  !> parameters in the output file.
+  !> True if a variable has no influence on the results of a run. The only such variable,
+  !> `run.threads`, is not stored among the parameters in the output file.
   pure function changes_nothing(variable) result(yes)
-    character(len=*), intent(in) :: variable      !! name of the variable, or a text that begins with this name
+    !> Name of a variable, or a text that starts with it.
+    character(len=*), intent(in) :: variable
     logical :: yes
 
     yes = index(variable, "run.threads") == 1
@@ -201,7 +205,7 @@ contains
     text = growing%text()
   end function overrides_text
 
-  !> Whether the description of the input in a file agrees with the given input.
+  !> True if a file describes the given input.
   function describes(file, input) result(yes)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input
@@ -213,7 +217,7 @@ contains
     yes = text == input%text .and. overrides == overrides_text(input)
   end function describes
 
-  !> Writes the value of one variable, if it has one.
+  !> Writes the value of a variable that has a value.
   subroutine describe_value(file, group, value)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: group
@@ -243,8 +247,9 @@ contains
     end select
   end subroutine describe_value
 
-  !> Writes all groups of one name as a table, with a dataset for each variable. For a variable with two choices, the dataset is
-  !> named after the second choice, and contains 1 for groups with this choice and 0 for the others.
+  !> Writes all groups of one name as a table, with a dataset for each variable. A variable with two
+  !> keywords becomes a dataset named after the second keyword, which contains 1 for groups with
+  !> this keyword and 0 for the others.
   subroutine describe_table(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -259,7 +264,7 @@ contains
       associate (row => table(groups(1)%values(k)%row))
         path = parameters_group//trim(row%group)//"/"
         second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
-        ! `file` is omitted, because `describe_rows` stores the obstacles that the file describes.
+        ! `file` is left out, because `describe_rows` stores the obstacles read from the file.
         if (row%name == "file") cycle
         if (row%kind == "text") then
           do g = 1, n
@@ -269,10 +274,11 @@ contains
           if (second /= "") call file%put(path//second, [n], merge(1_int32, 0_int32, texts == second))
         else
           if (.not. any([(groups(g)%values(k)%is_set(), g=1, n)])) cycle
-          ! Lists of points are omitted, because `describe_rows` stores the obstacles that follow
-          ! from them.
+          ! Lists of points are left out, because `describe_rows` stores the obstacles made from
+          ! them.
           if (row%size == 0) cycle
-          values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! NaN if a group has no value
+          ! NaN in groups without a value
+          values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)
           do g = 1, n
             if (size(groups(g)%reals_of(trim(row%name))) /= row%size) cycle
             values(row%size*(g - 1) + 1:row%size*g) = groups(g)%values(k)%reals
@@ -284,9 +290,9 @@ contains
     end do
   end subroutine describe_table
 
-  !> Writes a table of all obstacles in the groups of one name, in the order of their boundary ids: the geometry of each, and the
-  !> number of its group. The groups alone are not sufficient, because a file or a polyline describes several obstacles in one
-  !> group.
+  !> Writes a table of all obstacles in the groups of one name, in the order of their boundary ids:
+  !> the geometry of each obstacle and the number of its group. A table of the groups would not be
+  !> sufficient, because a file or a polyline describes several obstacles in one group.
   subroutine describe_rows(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -300,7 +306,7 @@ contains
     allocate (values(0))
     do k = 1, size(groups(1)%values)
       associate (row => table(groups(1)%values(k)%row))
-        if (row%status /= "example") cycle            ! `describe_table` stores the variables whose status is not "example"
+        if (row%status /= "example") cycle            ! the others are stored by `describe_table`
         values = [(groups(g)%reals_of(trim(row%name)), g=1, size(groups))]
         n = [(size(groups(g)%reals_of(trim(row%name)))/row%size, g=1, size(groups))]
         if (row%size == 1) call file%put(path//trim(row%name), [size(values)], values)
@@ -311,13 +317,14 @@ contains
     call file%put(path//"group", [size(group)], group)
   end subroutine describe_rows
 
-  !> Writes the values that are known only at the end of the run, or overwrites earlier values.
+  !> Writes the values that are known only at the end of the run. Values from earlier parts of the
+  !> run are overwritten.
   subroutine describe_end(file, threads, wall_seconds, rate, note)
     type(hdf5_file_t), intent(inout) :: file
     integer, intent(in) :: threads                    !! number of threads in the last part of the run
-    real(real64), intent(in) :: wall_seconds          !! wall time of the whole run, summed over its parts [s]
-    !> Two values for the last part of the run: collisions per processor time [1/s], and number of events that the serial engine
-    !> executed.
+    real(real64), intent(in) :: wall_seconds          !! total wall time of all parts of the run [s]
+    !> Collisions per processor time [1/s], and number of events executed by the serial engine, in
+    !> the last part of the run.
     real(real64), intent(in) :: rate(2)
     character(len=*), intent(in) :: note              !! reason why the run ended, if no stop rule was met
     character(len=longest_note) :: padded

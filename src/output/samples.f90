@@ -1,4 +1,4 @@
-!> Defines the series of which a frame, a sample of the observables and an event of the event log consist.
+!> Series of a frame, of a sample of the observables, and of an event in the event log.
 module samples
   use kinds, only: int32, int64, largest_exact
   use errors, only: error_t, exit_broken, fail
@@ -15,11 +15,11 @@ module samples
 
 contains
 
-  !> Series of the frames: step, time, and the values of all disks.
+  !> Series of a frame: step, time, and the values of all disks.
   pure function frame_series(list, n, single) result(series)
     type(frame_column_t), intent(in) :: list(:)   !! columns of the frames
     integer, intent(in) :: n                      !! number of disks
-    logical, intent(in) :: single                 !! .true. to store reals in single precision
+    logical, intent(in) :: single                 !! .true. for single precision
     type(series_t) :: series(2 + size(list))
     integer :: k
 
@@ -33,7 +33,7 @@ contains
     end do
   end function frame_series
 
-  !> Series of the observables: step, time, and every observable.
+  !> Series of a sample of the observables: step, time, and every observable.
   pure function observable_series(list) result(series)
     type(observable_list_t), intent(in) :: list
     type(series_t), allocatable :: series(:)
@@ -49,7 +49,7 @@ contains
     end do
   end function observable_series
 
-  !> Series of the event log, in the order of the values in its records.
+  !> Series of the event log, in the order of the values in a log entry.
   pure function event_series() result(series)
     type(series_t) :: series(5)
 
@@ -58,12 +58,13 @@ contains
       series_t(events_group//"momentum_change", double_precision, 1, [2, 1])]
   end function event_series
 
-  !> The events of the log as samples: times, impulses and changes of momentum, and the two partners.
+  !> Converts the logged events to samples: times, impulses and momentum changes, and the two
+  !> partners of each event.
   function event_samples(log) result(samples)
     type(event_log_t), intent(in) :: log
     type(sample_t) :: samples
 
-    ! With `source=` and this vector subscript, gfortran 12 allocates wrong values.
+    ! With `source=` and this vector subscript, gfortran 12 would allocate wrong values.
     allocate (samples%reals(4, log%n), samples%integers(2, log%n))
     samples%reals = log%record([1, 4, 5, 6], :log%n)
     samples%integers = int(log%record(2:3, :log%n), int64)
@@ -79,8 +80,8 @@ contains
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      ! An image counter must be smaller than `largest_exact`, because a frame may contain this
-      ! number plus one.
+      ! An image counter must be less than `largest_exact`, because a frame may contain the counter
+      ! plus 1.
       too_far = too_far .or. any(abs(sim%extra(i)%image) >= largest_exact)
     end do
     if (sim%tally%events > int(largest_exact, int64) .or. too_far) &

@@ -1,6 +1,6 @@
-!> Sampling schedules. Samples are due at multiples of a time, of a number of collisions or of a
-!> number of events, at given times, and at the start and the end of a run. The module also defines
-!> the progress of the output.
+!> Sampling schedules, and the progress of the output. Samples are due at multiples of a time, of a
+!> number of collisions or of a number of events, at given times, and at the start and the end of a
+!> run.
 module sampling_schedule
   use kinds, only: int64, never, real64
   use evolution, only: limits_t
@@ -11,17 +11,19 @@ module sampling_schedule
   private
   public :: schedule_t, by_time, by_collisions, by_events, progress_t, frames, values
 
-  !> Quantities in which the intervals between samples are measured.
+  !> Quantities in which sampling intervals are measured.
   integer, parameter :: by_time = 1, by_collisions = 2, by_events = 3
 
-  integer, parameter :: units_lost = 4  !! times that differ by at most this number of units in the last place are treated as equal
+  !> Times that differ by at most this number of units in the last place are treated as equal.
+  integer, parameter :: units_lost = 4
 
   type :: schedule_t
-    !> Intervals between samples: in time, in collisions and in events. They need not be integers.
+    !> Sampling intervals in time, in collisions and in events; not necessarily integers.
     real(real64) :: every(3) = never
-    type(sampling_t) :: chosen                    !! sampling schedule as in the input, including its list of times
-    integer(int64) :: count = 0                   !! number of samples taken; the first sample is due at the start
-    real(real64) :: next(3) = never               !! time, number of collisions and number of events of the next samples
+    type(sampling_t) :: chosen      !! sampling schedule in the input, including its list of times
+    integer(int64) :: count = 0                   !! number of samples taken; the first is due at the start
+    !> Time, number of collisions and number of events at which the next samples are due.
+    real(real64) :: next(3) = never
     real(real64) :: last_time = -1.0_real64       !! time of the last sample [time]
     integer(int64) :: last_events = -1            !! number of events and kicks before the last sample
   contains
@@ -35,10 +37,10 @@ module sampling_schedule
   end type schedule_t
 
   !> Progress of the output: the numbers of samples and of logged events written so far. Together
-  !> with the state of the simulation, it is sufficient to resume a run.
+  !> with the state of the simulation, this is all that is needed to resume a run.
   type :: progress_t
-    type(schedule_t) :: schedule(2)               !! schedules of frames and of observables
-    integer(int64) :: events = 0                  !! number of events written to the event log
+    type(schedule_t) :: schedule(2)               !! schedules of frames and observables
+    integer(int64) :: events = 0                  !! number of events in the event log
   end type progress_t
   integer, parameter :: frames = 1, values = 2
 
@@ -48,7 +50,7 @@ module sampling_schedule
 
 contains
 
-  !> Progress of the output at the start of a run, before any sample.
+  !> Progress of the output before the first sample.
   pure function new_progress(settings) result(progress)
     type(settings_t), intent(in) :: settings
     type(progress_t) :: progress
@@ -60,8 +62,8 @@ contains
     end do
   contains
 
-    !> Converts the intervals in the input to intervals of the time, of the number of collisions and
-    !> of the number of events. An interval in collisions per disk becomes one in collisions.
+    !> Converts the sampling intervals of the input to intervals in time, in collisions and in
+    !> events. An interval in collisions per disk becomes an interval in collisions.
     pure function intervals(every)
       real(real64), intent(in) :: every(:)        !! see `settings: sampled_by`
       real(real64) :: intervals(3)
@@ -70,7 +72,7 @@ contains
     end function intervals
   end function new_progress
 
-  !> Whether a sample is due now.
+  !> True if a sample is due at the present time.
   elemental function is_due(self, sim) result(yes)
     class(schedule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -80,7 +82,7 @@ contains
       .or. any([sim%tally%collisions, sim%tally%events] >= self%next(by_collisions:))
   end function is_due
 
-  !> Whether no sample of the present state has been taken.
+  !> True if the present state has not been sampled yet.
   pure function is_new(self, sim) result(yes)
     class(schedule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -100,8 +102,8 @@ contains
     call self%look_ahead(sim)
   end subroutine take
 
-  !> Finds the time and the numbers of collisions and events at which the next samples are due. At
-  !> the present time, a sample is due only if none has been taken and further events may occur.
+  !> Determines the time and the numbers of collisions and events at which the next samples are due.
+  !> A sample is due at the present time only if none has been taken and further events can occur.
   elemental subroutine look_ahead(self, sim)
     class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -112,7 +114,7 @@ contains
     self%next(by_collisions:) = next_number([sim%tally%collisions, sim%tally%events], self%every(by_collisions:))
   end subroutine look_ahead
 
-  !> Lowers the limits so that the simulation stops at the next sample.
+  !> Lowers the limits, so that the simulation pauses at the next sample.
   pure subroutine tighten(self, limits)
     class(schedule_t), intent(in) :: self
     type(limits_t), intent(inout) :: limits
@@ -124,9 +126,9 @@ contains
   end subroutine tighten
 
   !> Time of the next sample: the first sampling time t with t >= `time` and t > `past`. Sampling
-  !> times are the multiples of the interval, the logarithmic and the given times. Multiples are
-  !> calculated as products, because sums would accumulate rounding errors. Of several sampling
-  !> times that differ only by rounding errors, the last one is used.
+  !> times are the multiples of the interval, the logarithmic times, and the times given in the
+  !> input. Multiples are calculated as products, because sums would accumulate rounding errors. If
+  !> several sampling times differ only by rounding errors, the last of them is used.
   pure function next_time(self, time, past) result(next)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: time, past        !! [time]
@@ -158,14 +160,14 @@ contains
     end do
   contains
 
-    !> Whether the time t is not before `time`, and later than `past` by more than rounding errors.
+    !> True if t >= `time` and t exceeds `past` by more than rounding errors.
     pure logical function is_ahead(t)
       real(real64), intent(in) :: t
 
       is_ahead = t >= time .and. t > past + units_lost*spacing(past)
     end function is_ahead
 
-    !> The first of the given times for which `is_ahead` is .true.
+    !> First of the given times for which `is_ahead` is .true.
     pure real(real64) function first_ahead(times)
       real(real64), intent(in) :: times(:)        !! sampling times in ascending order [time]
       integer :: behind, ahead, middle
@@ -186,7 +188,7 @@ contains
   end function next_time
 
   !> Smallest number of collisions (or events) above n at which a multiple of the interval `every`
-  !> is reached. If this multiple is also the limit of the stop rule, the run ends there.
+  !> is reached. If this multiple is also the limit of a stop rule, the run ends at this number.
   elemental function next_number(n, every) result(next)
     integer(int64), intent(in) :: n
     real(real64), intent(in) :: every
@@ -202,9 +204,10 @@ contains
     next = whole_collisions(multiple*every)
   end function next_number
 
-  !> Number of samples of a run if it is known at the start, otherwise 0. It is known if the
+  !> Number of samples of a run, or 0 if it is unknown at the start. The number is known if the
   !> schedule has at most one interval and the only stop rule limits the same quantity: time,
-  !> collisions or events. If sampling times are given or logarithmic, this quantity must be the time.
+  !> collisions or events. With given or logarithmic sampling times, the limited quantity must be
+  !> the time.
   elemental function planned(self, limits) result(n)
     class(schedule_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! limits of the run
@@ -224,8 +227,8 @@ contains
     if (given(by_events)) n = numbers_within(limits%events, self%every(by_events))
   end function planned
 
-  !> Number of times from 0 to t, both included, at which samples are due; 0 if there are more than
-  !> `too_many`, for which the output does not reserve space.
+  !> Number of sampling times from 0 to t inclusive. The result is 0 if it would exceed `too_many`;
+  !> the output then reserves no space for the samples.
   pure function number_within(self, t) result(n)
     class(schedule_t), intent(in) :: self
     real(real64), intent(in) :: t                 !! [time]
@@ -243,8 +246,8 @@ contains
     if (n > too_many) n = 0
   end function number_within
 
-  !> Number of multiples of dt from 0 to t, both included; 0 if there are more than `too_many`, for
-  !> which the output does not reserve space.
+  !> Number of multiples of dt from 0 to t inclusive. The result is 0 if it would exceed `too_many`;
+  !> the output then reserves no space for the samples.
   pure function multiples_within(t, dt) result(n)
     real(real64), intent(in) :: t, dt
     integer(int64) :: n
@@ -258,8 +261,8 @@ contains
     n = n + 1
   end function multiples_within
 
-  !> Number of samples from 0 collisions (or events) up to a limit, including those at 0 and at the
-  !> limit.
+  !> Number of samples from 0 collisions (or events) up to a limit, including the samples at 0 and
+  !> at the limit.
   pure function numbers_within(limit, every) result(n)
     integer(int64), intent(in) :: limit
     real(real64), intent(in) :: every

@@ -1,4 +1,4 @@
-!> The state of a simulation as a record, which is the contents of a checkpoint.
+!> The state of a simulation as a record, for checkpoints.
 module state_record
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int8
@@ -14,18 +14,20 @@ module state_record
   private
   public :: exchange_all, layout
 
-  integer, parameter :: layout = 12               !! version of the layout of checkpoints; no other version can be read
+  !> Version of the checkpoint layout; checkpoints of other versions cannot be read.
+  integer, parameter :: layout = 12
 
 contains
 
-  !> Counts, writes or reads the numbers of a checkpoint. Before reading, the box and the species of the simulation must be set.
+  !> Counts, writes or reads the numbers of a checkpoint. Before a checkpoint is read, the box and
+  !> the species of the simulation must be set.
   subroutine exchange_all(file, record, sim, progress)
-    type(hdf5_file_t), intent(inout) :: file      !! the file is not accessed if the numbers are only counted
+    type(hdf5_file_t), intent(inout) :: file      !! not accessed if the numbers are only counted
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout) :: sim
     type(progress_t), intent(inout) :: progress
     integer(int64) :: settled
-    real(real64) :: offset(n_sides)               ! displacements of the sides at the start of their motions [length]
+    real(real64) :: offset(n_sides)      ! displacements of the sides when their motions began [length]
     integer :: k
 
     call exchange_changes(file, record, sim)
@@ -56,7 +58,8 @@ contains
     call sim%box%side%place(offset)
     call exchange_disks(file, record, sim)
     do k = 1, size(progress%schedule)
-      ! The times of the next samples are not stored, because they follow from the intervals in the input.
+      ! The times of the next samples are not stored, because they follow from the sampling
+      ! intervals in the input.
       associate (schedule => progress%schedule(k))
         call record%exchange(file, schedule%count)
         call record%exchange(file, schedule%last_events)
@@ -67,9 +70,9 @@ contains
     call record%seal(file)
   end subroutine exchange_all
 
-  !> Counts, writes or reads the number of scheduled changes that the run has made so far, and a checksum of these changes. When
-  !> reading, the procedure also brings the system into its state after these changes. If the checksum shows that the input contains
-  !> other changes, `changes_made` becomes -1.
+  !> Counts, writes or reads the number of scheduled changes made so far, and a checksum of these
+  !> changes. When reading, the procedure also brings the system to its state after the changes. If
+  !> the checksum shows that the input contains different changes, `changes_made` is set to -1.
   subroutine exchange_changes(file, record, sim)
     type(hdf5_file_t), intent(inout) :: file
     type(record_t), intent(inout) :: record
@@ -121,7 +124,8 @@ contains
     end associate
   end subroutine exchange_tally
 
-  !> Counts, writes or reads which disks wait outside of the box, and counters and sums of departures and entries.
+  !> Counts, writes or reads the list of disks waiting outside the box, and the counters and sums of
+  !> departures and entries.
   subroutine exchange_waiting(file, record, sim)
     type(hdf5_file_t), intent(inout) :: file
     type(record_t), intent(inout) :: record
@@ -138,7 +142,7 @@ contains
     call exchange_sums(file, record, sim%tally%flow)
   end subroutine exchange_waiting
 
-  !> Counts, writes or reads the 128-bit integers that represent exact sums.
+  !> Counts, writes or reads 128-bit integers, which represent exact sums.
   subroutine exchange_sums(file, record, sums)
     type(hdf5_file_t), intent(inout) :: file
     type(record_t), intent(inout) :: record
@@ -170,20 +174,20 @@ contains
       call exchange_short(file, record, tag%id)
       call record%exchange(file, tag%collisions)
       call exchange_short(file, record, tag%last_partner)
-      ! If disks have no individual masses and radii, the radii are not stored, because the input contains the radius of each
-      ! species.
+      ! Without individual masses and radii, the radii are not stored, because the input contains
+      ! the radius of each species.
       if (sim%features%own_sizes) call record%exchange(file, disk%radius)
     end associate
     settled = merge(1, 0, sim%events_done)
     do k = 1, merge(1, 0, sim%features%rotation) + merge(2, 0, sim%features%orientation)
-      ! Copies of `settled` make the length of the record depend on whether the run has rotation and orientation, so that a
-      ! checkpoint of a run with other features is detected.
+      ! Copies of `settled` make the length of the record depend on whether the run has rotation and
+      ! orientation, so that a checkpoint of a run with different features is detected.
       call record%exchange(file, settled)
     end do
     if (allocated(sim%series)) call record%pass(file, c_loc(sim%series(1)), size(sim%series)*storage_size(sim%series)/64)
     if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
     if (.not. sim%features%own_sizes) return
-    mass = sim%masses()                       ! individual masses are stored even if each equals the mass of the species
+    mass = sim%masses()      ! individual masses are stored even if all equal the mass of the species
     call record%exchange(file, mass)
     if (record%mode == reading) sim%own_mass = mass
   end subroutine exchange_disks
