@@ -1,5 +1,5 @@
-!> Reads the command line, with file names of any length, and prints the information requested by
-!> --help and similar options.
+!> Reads the command line, whose file names may have any length, and prints the information
+!> requested by options such as --help.
 module command_line
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use build_info, only: build_flags, git_commit
@@ -15,23 +15,24 @@ module command_line
   public :: command_t, read_command_line, parse_arguments, answer, help_text
 
   type :: command_t
-    !> Kind of information to be printed: help, version, print-defaults, print-variables or explain; empty for a run.
+    !> Information to be printed: help, version, print-defaults, print-variables or explain; empty
+    !> for a run.
     character(len=:), allocatable :: question
-    character(len=:), allocatable :: topic         !! variable or word to be explained by --explain
+    character(len=:), allocatable :: topic         !! topic of --explain: a variable or a word
     character(len=:), allocatable :: input         !! path of the input file
     character(len=:), allocatable :: output        !! path of the output file
-    type(text_t), allocatable :: overrides(:)      !! GROUP.VARIABLE=VALUE of each --set
+    type(text_t), allocatable :: overrides(:)      !! GROUP.VARIABLE=VALUE for each --set
     logical :: resume = .false.
-    logical :: check = .false.                     !! .true.: only validate the input
-    logical :: print_input = .false.               !! .true.: only print the input as JSON
+    logical :: check = .false.                     !! .true. to validate the input only
+    logical :: print_input = .false.               !! .true. to print the input as JSON only
     logical :: quiet = .false.
-    logical :: force = .false.                     !! .true.: replace a finished or unfinished output
+    logical :: force = .false.                     !! .true. to replace a finished or unfinished output
   end type command_t
 
   !> Parser of the command line.
   type :: parser_t
     type(text_t), allocatable :: arguments(:)
-    integer :: k = 0                               !! index of the argument that is being read
+    integer :: k = 0                               !! index of the argument being read
     type(command_t) :: command
     type(error_t), allocatable :: error
   contains
@@ -49,7 +50,7 @@ module command_line
 
 contains
 
-  !> Reads the arguments of the program.
+  !> Reads the command-line arguments of the program.
   subroutine read_command_line(command, error)
     type(command_t), intent(out) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -89,8 +90,7 @@ contains
     if (.not. allocated(error)) call check_name(command%output, error)
   end subroutine parse_arguments
 
-  !> Reads the arguments up to the first error, or up to an option that only prints information, such
-  !> as --help.
+  !> Reads the arguments until an error occurs or an option such as --help requests information.
   subroutine take_all(self)
     class(parser_t), intent(inout) :: self
     character(len=:), allocatable :: argument
@@ -115,7 +115,7 @@ contains
     end do
   end subroutine take_all
 
-  !> Reports an error in the command line, unless an earlier error has already been reported.
+  !> Reports an error in the command line, unless an error was already reported.
   subroutine refuse(self, why)
     class(parser_t), intent(inout) :: self
     character(len=*), intent(in) :: why
@@ -123,7 +123,7 @@ contains
     if (.not. allocated(self%error)) call fail(self%error, exit_usage, why)
   end subroutine refuse
 
-  !> Reads the option in argument k, with argument k+1 if that is its value.
+  !> Reads the option in argument k, and its value if that is argument k+1.
   subroutine take_option(self, name)
     class(parser_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -140,7 +140,7 @@ contains
     case ("--set")
       call self%take_value(name, value%text)
       call self%expect_assignment(value%text)
-      ! a constructor `text_t(...)` would leak memory with gfortran 12
+      ! with gfortran 12 a constructor `text_t(...)` would leak memory
       self%command%overrides = [self%command%overrides, value]
     case ("--explain")
       self%command%question = "explain"
@@ -179,8 +179,8 @@ contains
     if (value == "") call self%refuse("option "//name//" needs a value")
   end subroutine take_value
 
-  !> Reports an error for `--set NAME VALUE` (without `=`), in which VALUE would be taken for a
-  !> file name.
+  !> Reports an error for `--set NAME VALUE` (without `=`), where VALUE would be mistaken for a file
+  !> name.
   subroutine expect_assignment(self, text)
     class(parser_t), intent(inout) :: self
     character(len=*), intent(in) :: text
@@ -192,8 +192,8 @@ contains
     end associate
   end subroutine expect_assignment
 
-  !> Reports an unknown option, and suggests a known option or a file name that the user may have
-  !> meant.
+  !> Reports an unknown option. The message suggests the known option or the file name that the user
+  !> may have meant.
   subroutine report_unknown(self, name)
     class(parser_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -206,7 +206,7 @@ contains
     call self%refuse("unknown option "//shown(name)//"; "//meant)
   end subroutine report_unknown
 
-  !> Default path of the output, runs/NAME.h5, where NAME is the name of the input file.
+  !> Default path of the output: runs/NAME.h5 for the input file NAME.nml.
   pure function default_output(input) result(output)
     character(len=*), intent(in) :: input
     character(len=:), allocatable :: output
@@ -218,7 +218,7 @@ contains
     output = "runs/"//output//".h5"
   end function default_output
 
-  !> Prints the information selected by `command%question`.
+  !> Prints the requested information.
   subroutine answer(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -241,7 +241,7 @@ contains
     call print_text(text, error)
   end subroutine answer
 
-  !> Answer to `--version`, which contains all data that a bug report needs.
+  !> Output of `--version`, with all data required in a bug report.
   function version_text() result(text)
     character(len=:), allocatable :: text
 
@@ -250,7 +250,7 @@ contains
       "threads:  "//trim(merge("set by run.threads", "one, no OpenMP    ", index(build_flags, "-fopenmp") > 0))
   end function version_text
 
-  !> Answer to `--help`, which fits on one screen.
+  !> Output of `--help`, which fits on one screen.
   pure function help_text() result(text)
     character(len=:), allocatable :: text
 

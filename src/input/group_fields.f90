@@ -1,4 +1,4 @@
-!> The variables of one group of the input, for types that read their settings themselves.
+!> Access to the variables of one input group, for types that read their own settings.
 module group_fields
   use kinds, only: int64, real64
   use fields, only: fields_t
@@ -12,7 +12,7 @@ module group_fields
 
   type, extends(fields_t) :: group_fields_t
     type(group_t) :: group
-    type(problem_list_t) :: problems           !! problems of the whole input
+    type(problem_list_t) :: problems           !! problems of the entire input
   contains
     procedure :: read_real
     procedure :: read_reals
@@ -26,7 +26,7 @@ module group_fields
 
 contains
 
-  !> Stores the value of a variable of kind "real", if the variable has a value.
+  !> Stores the value of a real variable; an unset variable leaves the default unchanged.
   subroutine read_real(self, name, value)
     class(group_fields_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -35,7 +35,7 @@ contains
     value = self%group%real_of(name, value)
   end subroutine read_real
 
-  !> Stores the values of a variable of kind "real", if the variable has values.
+  !> Stores the values of a real variable; an unset variable leaves the defaults unchanged.
   subroutine read_reals(self, name, values)
     class(group_fields_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -46,7 +46,8 @@ contains
     end associate
   end subroutine read_reals
 
-  !> Stores the values of a variable of kind "real" as pairs, and reports an odd number of values.
+  !> Stores the values of a real variable as pairs. An odd number of values is reported as a
+  !> problem.
   subroutine read_pairs(self, name, pairs)
     class(group_fields_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -59,7 +60,7 @@ contains
     end associate
   end subroutine read_pairs
 
-  !> Stores the value of a variable of kind "integer", if the variable has a value.
+  !> Stores the value of an integer variable; an unset variable leaves the default unchanged.
   subroutine read_integer(self, name, value)
     class(group_fields_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -68,7 +69,7 @@ contains
     value = self%group%integer_of(name, value)
   end subroutine read_integer
 
-  !> Stores the values of a variable of kind "integer", if the variable has values.
+  !> Stores the values of an integer variable; an unset variable leaves the defaults unchanged.
   subroutine read_integers(self, name, values)
     class(group_fields_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -79,7 +80,7 @@ contains
     end associate
   end subroutine read_integers
 
-  !> Stores the value of a variable of kind "logical", if the variable has a value.
+  !> Stores the value of a logical variable; an unset variable leaves the default unchanged.
   subroutine read_logical(self, name, value)
     class(group_fields_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -88,7 +89,7 @@ contains
     if (self%group%text_of(name) /= "") value = self%group%text_of(name) == ".true."
   end subroutine read_logical
 
-  !> Whether the user has set a variable to a valid value.
+  !> True if the user has set the variable and its value is valid.
   function is_sound(self, name) result(yes)
     class(group_fields_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -97,7 +98,7 @@ contains
     yes = self%group%given(name) .and. .not. self%group%faulty(name)
   end function is_sound
 
-  !> Reports a problem of a variable.
+  !> Reports an invalid value of a variable.
   subroutine complain(self, name, what)
     class(group_fields_t), intent(inout) :: self
     character(len=*), intent(in) :: name, what

@@ -1,5 +1,5 @@
-!> Values of the input variables as a run uses them, ordered by group and name. All of them are
-!> stored in the output file; `settings` contains them as typed data.
+!> Values of all input variables as used in the run, ordered by group and name. All of them are
+!> stored in the output file; the module `settings` contains the same values as typed data.
 module input_groups
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
@@ -9,21 +9,24 @@ module input_groups
   private
   public :: value_t, group_t, text_length, range_of, json_text, same_value, same_values
 
-  integer, parameter :: text_length = 512      !! longest text value, in bytes
-  integer, parameter, public :: most_written = 100      !! largest number of values in an assignment; longer lists are truncated
+  integer, parameter :: text_length = 512      !! maximum length of a string [bytes]
+  !> Maximum number of values written in an assignment; longer lists are truncated.
+  integer, parameter, public :: most_written = 100
 
-  !> The value of one variable: `reals` for real numbers, `texts` for all others. An integer is
-  !> stored as decimal digits, which can represent every 64-bit integer, and a logical as `.true.`
-  !> or `.false.`. Neither array is allocated if the variable has no value.
+  !> Value of one variable: an array `reals` for real variables, `texts` for all others. Integers
+  !> are stored as decimal digits, which can represent every 64-bit integer, and logicals as
+  !> `.true.` or `.false.`. For a variable without a value, neither array is allocated.
   type :: value_t
     integer :: row = 0                         !! row of the variable in the table of variables
     character(len=name_length) :: name = ""
-    character(len=8) :: kind = ""              !! type of the values, 'integer', 'real', 'logical' or 'text'
+    character(len=8) :: kind = ""              !! type of the values: 'integer', 'real', 'logical' or 'text'
     logical :: given = .false.                 !! .true. if the user has set the variable
-    logical :: faulty = .false.                !! .true. if the user has set an invalid value, which has been reported
-    !> Number of the line that sets the variable, or the negative integer -k for override number k
+    !> .true. if the user has set an invalid value, which has been reported.
+    logical :: faulty = .false.
+    !> Line number of the assignment in the input file, or -k for override number k.
     integer :: line = 0
-    integer :: elements = 0                    !! bit mask: bit i is 1 if element i has been set by name(i) = value
+    !> Bit mask: bit i is set if element i was assigned by name(i) = value.
+    integer :: elements = 0
     real(real64), allocatable :: reals(:)
     character(len=text_length), allocatable :: texts(:)
   contains
@@ -34,14 +37,17 @@ module input_groups
     procedure :: json
   end type value_t
 
-  !> One group of the input, or one instance of a repeated group. The functions that return the
-  !> value of a variable return `otherwise` if there is none.
+  !> One group of the input. A repeated group is stored once per instance. Functions that return the
+  !> value of a variable return `otherwise` for a variable without a value.
   type :: group_t
     character(len=8) :: name = ""
-    character(len=text_length) :: instance = ""  !! name that distinguishes a group that may occur several times; otherwise blank
-    integer :: number = 0                      !! number among the groups of the same name, starting at 1
-    integer :: line = 0  !! number of the first line of the group in the file; 0 if the file does not contain the group
-    integer :: first = 0, last = 0             !! positions of the first character (&) and the last character (/) of the group
+    !> Name of an instance of a repeated group; otherwise blank.
+    character(len=text_length) :: instance = ""
+    integer :: number = 0      !! number of this instance among the groups of the same name, starting at 1
+    !> Line number of the start of the group; 0 if the input file does not contain the group.
+    integer :: line = 0
+    !> Positions of the characters & and / at the start and the end of the group.
+    integer :: first = 0, last = 0
     type(value_t), allocatable :: values(:)
   contains
     procedure :: integer_of, real_of, reals_of, text_of
@@ -54,7 +60,7 @@ module input_groups
 
 contains
 
-  !> Whether the variable has a value.
+  !> True if the variable has a value.
   pure function is_set(self)
     class(value_t), intent(in) :: self
     logical :: is_set
@@ -72,7 +78,7 @@ contains
     if (allocated(self%texts)) length = size(self%texts)
   end function length
 
-  !> The values of a variable of kind "integer".
+  !> Values of an integer variable.
   pure function integers(self) result(numbers)
     class(value_t), intent(in) :: self
     integer(int64), allocatable :: numbers(:)
@@ -85,8 +91,8 @@ contains
     end if
   end function integers
 
-  !> Whether all variables have the same values in two inputs. Defaults are used for variables that
-  !> are not set.
+  !> True if all variables have the same values in two inputs. Unset variables are compared by their
+  !> defaults.
   pure function same_values(one, other) result(yes)
     type(group_t), intent(in) :: one(:), other(:)  !! groups of the two inputs, in the same order
     logical :: yes
@@ -100,7 +106,7 @@ contains
     end do
   end function same_values
 
-  !> Whether two values of a variable are equal.
+  !> True if two values of a variable are equal.
   pure function same_value(one, other) result(yes)
     type(value_t), intent(in) :: one, other
     logical :: yes
@@ -115,7 +121,7 @@ contains
     end if
   end function same_value
 
-  !> Removes the value of the variable.
+  !> Removes the value of a variable.
   pure subroutine clear(self)
     class(value_t), intent(inout) :: self
 
@@ -123,7 +129,7 @@ contains
     if (allocated(self%texts)) deallocate (self%texts)
   end subroutine clear
 
-  !> The first value of a variable of kind "integer".
+  !> First value of an integer variable.
   pure function integer_of(self, name, otherwise) result(number)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -136,7 +142,7 @@ contains
     end associate
   end function integer_of
 
-  !> Values of a variable of kind "real"; an empty array if the variable has no value.
+  !> Values of a real variable; empty if the variable has no value.
   pure function reals_of(self, name) result(numbers)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -151,7 +157,7 @@ contains
     end associate
   end function reals_of
 
-  !> The first value of a variable of kind "real" or "integer".
+  !> First value of a real or integer variable.
   pure function real_of(self, name, otherwise) result(number)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -168,7 +174,7 @@ contains
     end associate
   end function real_of
 
-  !> First value of a variable of any kind except "real"; an empty string if it has no value.
+  !> First value of a variable that is not real; an empty string if the variable has no value.
   pure function text_of(self, name) result(text)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -180,7 +186,7 @@ contains
     end associate
   end function text_of
 
-  !> Whether the user has set a variable.
+  !> True if the user has set the variable.
   pure function given(self, name)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -189,7 +195,7 @@ contains
     given = self%values(row_of(self%name, name))%given
   end function given
 
-  !> Whether the user has set a variable to an invalid value, which has been reported.
+  !> True if the user has set the variable to an invalid value. The problem has then been reported.
   pure function faulty(self, name)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -198,7 +204,7 @@ contains
     faulty = self%values(row_of(self%name, name))%faulty
   end function faulty
 
-  !> Stores a string, calculated from other variables, as the value of a variable.
+  !> Stores a derived string as the value of a variable.
   pure subroutine put_text(self, name, text)
     class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -211,7 +217,7 @@ contains
     end associate
   end subroutine put_text
 
-  !> Stores real numbers, calculated from other variables, as the values of a variable.
+  !> Stores derived real numbers as the values of a variable.
   pure subroutine put_reals(self, name, numbers)
     class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -220,12 +226,12 @@ contains
     self%values(row_of(self%name, name))%reals = numbers
   end subroutine put_reals
 
-  !> Reports a problem of a variable, with the number of the line that sets it or, if there is none,
-  !> of the first line of the group.
+  !> Reports a problem with a variable. The message cites the line of the assignment or, without an
+  !> assignment, the first line of the group.
   pure subroutine complain(self, name, what, problems)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
-    character(len=*), intent(in) :: what       !! the problem and the allowed values
+    character(len=*), intent(in) :: what       !! the problem, and the allowed values
     type(problem_list_t), intent(inout) :: problems
 
     associate (line => self%values(row_of(self%name, name))%line)
@@ -244,12 +250,12 @@ contains
     end associate
   end subroutine demand
 
-  !> Sets choices (such as `placement = 'grid'`) that are not given but follow from other variables:
-  !> a given variable that has an effect only with one choice (such as `grid`) implies this choice.
-  !> If several variables imply a choice, the last in the table takes precedence.
+  !> Infers choices, such as `placement = 'grid'`, from the other variables: if a variable that has
+  !> an effect only with one choice (such as `grid`) is set, this choice is implied. If several
+  !> variables imply different choices, the last variable in the table takes precedence.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of a variable, and its values in the condition
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! variable name and values of a condition
     integer :: k
 
     do k = 1, size(self%values)
@@ -259,14 +265,14 @@ contains
     end do
   end subroutine infer_choices
 
-  !> Checks the variables that have an effect only with certain choices. A variable required by a
-  !> choice must be given. The value of a variable without effect is removed, and reported as an
-  !> error if the user has set it, because no part of an input may be ignored silently. Variables
-  !> that exclude each other are also reported.
+  !> Checks the variables whose effect depends on choices. A variable required by a choice must be
+  !> set. The value of a variable without effect is removed; if the user has set it, an error is
+  !> reported, because no part of an input may be ignored silently. Variables that exclude each
+  !> other are also reported.
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! name of a variable, and its values in the condition
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! variable name and values of a condition
     character(len=len(table%goes_with)) :: word
     integer :: j, k
 
@@ -293,13 +299,13 @@ contains
     end do
   end subroutine check_choices
 
-  !> Reports that a choice requires a variable that is not given. If it requires one of two
-  !> variables that exclude each other, for example drive.temperature or drive.velocity, this is
-  !> reported only once.
+  !> Reports an unset variable that is required by a choice. If the choice requires one of two
+  !> variables that exclude each other, for example drive.temperature or drive.velocity, the problem
+  !> is reported only once.
   pure subroutine demand_one(self, k, choice, word, problems)
     class(group_t), intent(in) :: self
-    integer, intent(in) :: k                           !! position of the variable in `self%values`
-    character(len=*), intent(in) :: choice, word       !! name and value of the variable that makes the choice
+    integer, intent(in) :: k                           !! index of the variable in `self%values`
+    character(len=*), intent(in) :: choice, word  !! name and value of the variable that represents the choice
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: needed
     integer :: j
@@ -316,11 +322,11 @@ contains
     call self%complain(choice, "'"//word//"' needs "//needed, problems)
   end subroutine demand_one
 
-  !> Indices of the first and the last group with one of the given names. If there is none, the last
-  !> index is smaller than the first.
+  !> Indices of the first and the last group with one of the given names. If there is no such group,
+  !> the last index is smaller than the first.
   pure function range_of(groups, names) result(range)
-    type(group_t), intent(in) :: groups(:)   !! groups in the order of the table
-    character(len=*), intent(in) :: names(:)           !! names of groups that are adjacent in the table
+    type(group_t), intent(in) :: groups(:)   !! groups, in the order of the table
+    character(len=*), intent(in) :: names(:)           !! group names that are adjacent in the table
     integer :: range(2), k
     logical :: named(size(groups))
 
@@ -329,11 +335,11 @@ contains
     range(2) = range(1) + count(named) - 1
   end function range_of
 
-  !> A line that assigns the value of a variable, such as `species.bed.radius = 0.005`.
+  !> Assignment of a value to a variable, such as `species.bed.radius = 0.005`.
   pure function value_line(self, k, most) result(text)
     class(group_t), intent(in) :: self
     integer, intent(in) :: k                   !! index of the variable in the group
-    integer, intent(in), optional :: most      !! largest number of values; a longer list is truncated
+    integer, intent(in), optional :: most      !! maximum number of values; a longer list is truncated
     character(len=:), allocatable :: text
     integer :: longest
 
@@ -344,8 +350,8 @@ contains
     text = text//trim(self%values(k)%name)//" = "//self%values(k)%json(longest)
   end function value_line
 
-  !> Converts the value of a variable, or a list of values, to JSON, truncating a list to `most`
-  !> values.
+  !> Converts the value or values of a variable to JSON. A list of more than `most` values is
+  !> truncated.
   pure function json(self, most) result(text)
     class(value_t), intent(in) :: self
     integer, intent(in), optional :: most
@@ -374,7 +380,7 @@ contains
     if (table(self%row)%size /= 1 .or. n > 1) text = "["//text//"]"
   end function json
 
-  !> Converts a text to JSON, without its trailing blanks.
+  !> Converts a string to JSON, without its trailing blanks.
   pure function json_text(text) result(quoted)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted

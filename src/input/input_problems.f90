@@ -1,4 +1,4 @@
-!> Collects all problems of an input, so that they can be reported together.
+!> Collects all problems of an input, to be reported together.
 module input_problems
   use errors, only: error_t, exit_files, exit_usage
   use texts, only: legible, text_t, written
@@ -6,20 +6,22 @@ module input_problems
   private
   public :: problem_list_t
 
-  integer, parameter, public :: most_problems = 100          !! largest number of problems that are reported
-  integer, parameter :: whole_file = 1000000000 !! rank of a problem of the whole file, larger than any line number
+  integer, parameter, public :: most_problems = 100          !! maximum number of problems in a report
+  !> Rank of a problem with the whole file; larger than any line number.
+  integer, parameter :: whole_file = 1000000000
 
   type :: problem_t
-    integer :: line  !! line number in the input file; 0 for the whole file; the negative integer -k for override number k
+    !> Line number in the input file; 0 for the whole file; -k for override number k.
+    integer :: line
     character(len=:), allocatable :: text
   end type problem_t
 
-  !> The list of problems in the order of the report: those of single lines of the file, in the
-  !> order of the lines; those of the whole file; those of overrides.
+  !> List of problems in the order in which they are reported: problems with single lines by line
+  !> number, then problems with the whole file, then problems with overrides.
   type :: problem_list_t
     integer :: count = 0
-    integer :: unreadable = 0                   !! number of problems that concern an unreadable file
-    logical :: cut_short = .false.              !! .true. if there were more problems than the list can contain
+    integer :: unreadable = 0                   !! number of problems with unreadable files
+    logical :: cut_short = .false.              !! .true. if further problems did not fit into the list
     type(problem_t) :: items(most_problems)
   contains
     procedure :: add
@@ -28,12 +30,12 @@ module input_problems
 
 contains
 
-  !> Adds the problem `where: what` to the list, unless the list already contains the problem.
+  !> Adds the problem `where: what` to the list, unless the list already contains it.
   pure subroutine add(self, line, where, what)
     class(problem_list_t), intent(inout) :: self
     integer, intent(in) :: line                 !! as in `problem_t`
     character(len=*), intent(in) :: where       !! group or group.variable
-    character(len=*), intent(in) :: what        !! the problem and the allowed values
+    character(len=*), intent(in) :: what        !! the problem, and the allowed values
     character(len=:), allocatable :: text
     integer :: k
 
@@ -54,7 +56,7 @@ contains
     self%count = self%count + 1
   end subroutine add
 
-  !> Rank of a line number, which determines the order of the report.
+  !> Rank of a line number in the order of the report.
   pure function rank(line)
     integer, intent(in) :: line
     integer :: rank
@@ -62,13 +64,13 @@ contains
     rank = merge(line, whole_file - line, line > 0)
   end function rank
 
-  !> Converts all problems to one error, with one line per problem in the form path:line:
+  !> Converts all problems to one error. Each problem becomes a line of the form path:line:
   !> group.variable: problem, allowed values.
   subroutine report(self, path, error, overrides)
     class(problem_list_t), intent(in) :: self
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    type(text_t), intent(in), optional :: overrides(:)    !! texts of the overrides, which the message quotes
+    type(text_t), intent(in), optional :: overrides(:)    !! overrides as texts, quoted in the message
     character(len=:), allocatable :: text, place
     integer :: k
 

@@ -1,5 +1,5 @@
-!> Converts the groups of the input to `settings`, calculates values that follow from others, and
-!> checks whether the values are compatible.
+!> Converts the groups of the input to `settings`, derives missing values, and checks that the
+!> values are compatible.
 module input_settings
   use kinds, only: int64, never, real64
   use box_geometry, only: box_t
@@ -23,15 +23,16 @@ module input_settings
   public :: resolve_settings
 
   integer(int64), parameter :: unlimited = huge(1_int64)
-  integer, parameter :: most_conflicts = 40             !! at least the number of calls of `add_conflict`
+  !> Upper limit for the number of calls of `add_conflict`.
+  integer, parameter :: most_conflicts = 40
   character(len=*), parameter :: other_rule = "; give another rule"
   character(len=*), parameter :: energy = "stop.energy_fraction", rest = "stop.at_rest"
 
-  !> Settings of different groups that cannot be combined.
+  !> Settings of different groups that cannot be combined with each other.
   type :: conflict_list_t
     integer :: count = 0
     type(text_t) :: variable(most_conflicts)            !! group, or group.variable
-    type(text_t) :: other(most_conflicts)               !! the other setting, and advice
+    type(text_t) :: other(most_conflicts)               !! the conflicting setting, and advice
   contains
     procedure :: add => add_conflict
     procedure :: report => report_conflicts
@@ -39,13 +40,14 @@ module input_settings
 
 contains
 
-  !> Fills the settings. Calculated values are also stored in the groups, which then contain all
-  !> values that the run uses.
+  !> Converts the groups to settings. Derived values are also stored in the groups, which then
+  !> contain all values used in the run.
   subroutine resolve_settings(groups, settings, problems, stepped)
     type(group_t), intent(inout) :: groups(:)             !! groups of the same name are adjacent
     type(settings_t), intent(out) :: settings
     type(problem_list_t), intent(inout) :: problems
-    logical, intent(in), optional :: stepped              !! .true. if the caller ends the run, so that `&stop` may be empty
+    !> .true. if the caller ends the run; `&stop` may then be empty.
+    logical, intent(in), optional :: stepped
     logical :: must_end
     type(wall_law_t) :: wall_law                        ! default contact law of walls, from `&contact`
     integer :: e(2), o(2), s(2), w(2), k
@@ -73,7 +75,7 @@ contains
     call check_conflicts(settings, groups, must_end, problems)
   end subroutine resolve_settings
 
-  !> Sets title, seed and numerical method.
+  !> Reads the title, the seed and the numerical method.
   subroutine take_run(group, run, problems)
     type(group_t), intent(in) :: group
     type(run_settings_t), intent(inout) :: run
@@ -90,7 +92,7 @@ contains
       call group%complain("dt", "is missing; dynamics = 'steps' needs it", problems)
   end subroutine take_run
 
-  !> Sets up the box without its obstacles.
+  !> Reads the box, without its obstacles.
   subroutine take_box(group, box, problems)
     type(group_t), intent(in) :: group
     type(box_t), intent(inout) :: box
@@ -109,7 +111,8 @@ contains
     end do
   end subroutine take_box
 
-  !> Sets the coefficients of restitution for each pair of species, and the default contact law of walls.
+  !> Reads the coefficients of restitution for all pairs of species, and the default contact law of
+  !> walls.
   subroutine take_contact(group, n, law, wall_law, problems)
     type(group_t), intent(inout) :: group
     integer, intent(in) :: n                            !! number of species
@@ -146,7 +149,7 @@ contains
       "must be symmetric: the value for species a and b is the value for b and a", problems)
   end subroutine take_contact
 
-  !> Sets the driving and the driven species.
+  !> Reads the driving and the species to which it is applied.
   subroutine take_drive(group, species, drive, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: species(:)          !! names of the species
@@ -167,7 +170,7 @@ contains
       call group%complain("species", "there is no species "//shown(wanted)//"; "//suggestion(wanted, species), problems)
   end subroutine take_drive
 
-  !> Sets the sources.
+  !> Reads all sources.
   subroutine take_sources(groups, species, box, sources, problems)
     type(group_t), intent(inout) :: groups(:)
     character(len=*), intent(in) :: species(:)          !! names of the species
@@ -184,7 +187,8 @@ contains
     end do
   end subroutine take_sources
 
-  !> Sets one source. Without the name of a species, the source belongs to the only species.
+  !> Reads one source. If the source names no species, there must be only one, to which its disks
+  !> belong.
   subroutine take_source(group, species, box, source, problems)
     type(group_t), intent(inout) :: group
     character(len=*), intent(in) :: species(:)          !! names of the species
@@ -216,7 +220,7 @@ contains
     source%end_time = group%real_of("end_time", never)
   end subroutine take_source
 
-  !> Sets the stop rules.
+  !> Reads the stop rules.
   subroutine take_stop(group, must_end, rule, problems)
     type(group_t), intent(in) :: group
     logical, intent(in) :: must_end                     !! .true. if the input must contain a stop rule
@@ -235,7 +239,7 @@ contains
       call problems%add(group%line, "stop", "no rule ends the run; give at least one of "//joined(variables_of("stop"), ", "))
   end subroutine take_stop
 
-  !> Sets the contents of the output and the sampling schedules.
+  !> Reads the contents of the output and the sampling schedules.
   subroutine take_output(group, output, problems)
     type(group_t), intent(in) :: group
     type(output_settings_t), intent(inout) :: output
@@ -256,7 +260,7 @@ contains
     output%checkpoint_every = group%real_of("checkpoint_every", never)
   end subroutine take_output
 
-  !> Sets the sampling schedule of frames or observables.
+  !> Reads the sampling schedule of frames or observables.
   subroutine take_sampling(group, what, sampling, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: what                !! one of `sampled`
@@ -275,8 +279,8 @@ contains
       "the times must increase", problems)
   end subroutine take_sampling
 
-  !> Reports settings of different groups that cannot be combined, and intervals that are too short.
-  !> Variables of the same group that exclude each other are reported by `input_groups`.
+  !> Reports settings of different groups that cannot be combined, and sampling intervals that are
+  !> too short. Mutually exclusive variables of one group are reported by `input_groups` instead.
   subroutine check_conflicts(settings, groups, must_end, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
@@ -300,12 +304,12 @@ contains
     call check_number("output", "observables_every_time", "samples", 1.0e9_real64, settings%stop, groups, problems)
   end subroutine check_conflicts
 
-  !> Adds a conflict to the list, if both settings are present.
+  !> Adds a conflict to the list if both settings are present.
   pure subroutine add_conflict(self, together, variable, other)
     class(conflict_list_t), intent(inout) :: self
     logical, intent(in) :: together                     !! .true. if both settings are present
     character(len=*), intent(in) :: variable            !! group, or group.variable
-    character(len=*), intent(in) :: other               !! the other setting, and advice
+    character(len=*), intent(in) :: other               !! the conflicting setting, and advice
 
     if (.not. together) return
     self%count = self%count + 1
@@ -313,7 +317,7 @@ contains
     self%other(self%count)%text = other
   end subroutine add_conflict
 
-  !> Reports all conflicts of the list.
+  !> Reports all listed conflicts as problems.
   pure subroutine report_conflicts(self, groups, problems)
     class(conflict_list_t), intent(in) :: self
     type(group_t), intent(in) :: groups(:)
@@ -332,7 +336,7 @@ contains
     end do
   end subroutine report_conflicts
 
-  !> Adds conflicts of gravity, shear, time steps and Helfand moments.
+  !> Adds conflicts with gravity, shear, time steps and Helfand moments.
   pure subroutine add_box_conflicts(settings, names, conflicts)
     type(settings_t), intent(in) :: settings
     character(len=*), intent(in) :: names(:)            !! names of all groups
@@ -357,7 +361,7 @@ contains
     end associate
   end subroutine add_box_conflicts
 
-  !> Adds conflicts of the stop rule `energy_fraction` in a closed system.
+  !> Adds conflicts with the stop rule `energy_fraction` in a closed system.
   pure subroutine add_energy_conflicts(settings, must_end, conflicts)
     type(settings_t), intent(in) :: settings
     logical, intent(in) :: must_end
@@ -378,7 +382,7 @@ contains
     end associate
   end subroutine add_energy_conflicts
 
-  !> Adds conflicts of the stop rule `at_rest`.
+  !> Adds conflicts with the stop rule `at_rest`.
   pure subroutine add_rest_conflicts(settings, conflicts)
     type(settings_t), intent(in) :: settings
     type(conflict_list_t), intent(inout) :: conflicts
@@ -399,7 +403,7 @@ contains
     end associate
   end subroutine add_rest_conflicts
 
-  !> Adds conflicts of open systems.
+  !> Adds conflicts with the openness of the system.
   pure subroutine add_conflicts_of_open_systems(settings, names, conflicts)
     type(settings_t), intent(in) :: settings
     character(len=*), intent(in) :: names(:)            !! names of all groups
@@ -416,7 +420,7 @@ contains
       "stop.disks_inside", "closed sides (side.open): no disk ever leaves the box")
   end subroutine add_conflicts_of_open_systems
 
-  !> Adds conflicts of the driving.
+  !> Adds conflicts with the driving.
   pure subroutine add_drive_conflicts(settings, conflicts)
     type(settings_t), intent(in) :: settings
     type(conflict_list_t), intent(inout) :: conflicts
@@ -427,19 +431,19 @@ contains
     call add_drive_conflict(settings%drive, "output.helfand", settings%output%helfand, conflicts)
   end subroutine add_drive_conflicts
 
-  !> Adds a setting that the kind of driving refuses.
+  !> Adds a conflict if the input contains a setting that the type of driving does not support.
   pure subroutine add_drive_conflict(drive, setting, is_there, conflicts)
     class(drive_t), intent(in) :: drive
     character(len=*), intent(in) :: setting             !! group, or group.variable
     logical, intent(in) :: is_there
     type(conflict_list_t), intent(inout) :: conflicts
-    character(len=:), allocatable :: reason             ! with `associate`, gfortran 12 would free the result twice
+    character(len=:), allocatable :: reason      ! with `associate`, gfortran 12 would free the result twice
 
     reason = drive%conflict(setting)
     call conflicts%add(is_there .and. reason /= "", setting, reason)
   end subroutine add_drive_conflict
 
-  !> Adds stop rules that a single disk never meets.
+  !> Adds stop rules that a single disk can never satisfy.
   pure subroutine add_single_disk_conflicts(settings, must_end, conflicts)
     type(settings_t), intent(in) :: settings
     logical, intent(in) :: must_end
@@ -456,7 +460,7 @@ contains
     end associate
   end subroutine add_single_disk_conflicts
 
-  !> Whether the run ends at a given time.
+  !> True if the run ends at a given time.
   pure function has_time_limit(rule, must_end) result(yes)
     type(stop_settings_t), intent(in) :: rule
     logical, intent(in) :: must_end
@@ -465,7 +469,7 @@ contains
     yes = min(rule%time, rule%wall_clock) < never .or. .not. must_end
   end function has_time_limit
 
-  !> Whether the run ends after a number of collisions.
+  !> True if the run ends at a number of collisions.
   pure function has_collision_limit(rule) result(yes)
     type(stop_settings_t), intent(in) :: rule
     logical :: yes
@@ -473,7 +477,7 @@ contains
     yes = rule%collisions < unlimited .or. rule%collisions_per_disk < never
   end function has_collision_limit
 
-  !> Reports columns of the frames that output.frame_columns names twice.
+  !> Reports columns that are listed twice in output.frame_columns.
   subroutine check_columns(output, groups, problems)
     type(output_settings_t), intent(in) :: output
     type(group_t), intent(in) :: groups(:)
@@ -490,14 +494,14 @@ contains
     end associate
   end subroutine check_columns
 
-  !> Checks the conditions for a placement that moves all disks of the run.
+  !> Checks the conditions for placements that move all disks of the run.
   subroutine check_placements(settings, groups, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
     logical :: moves_all(size(settings%species))
     real(real64) :: whole(4)
-    character(len=:), allocatable :: word               ! with `associate`, gfortran 12 would free the result twice
+    character(len=:), allocatable :: word      ! with `associate`, gfortran 12 would free the result twice
     integer :: s(2), k, other
 
     s = range_of(groups, ["species"])
@@ -521,7 +525,7 @@ contains
     end associate
   end subroutine check_placements
 
-  !> Reports that a variable, if it is set, cannot be combined with a placement.
+  !> Reports a variable that is set although it cannot be combined with the placement.
   subroutine refuse_placement(is_there, variable, placement, group, problems)
     logical, intent(in) :: is_there
     character(len=*), intent(in) :: variable
@@ -534,13 +538,13 @@ contains
     if (is_there .and. reason /= "") call group%complain("placement", reason, problems)
   end subroutine refuse_placement
 
-  !> Reports sources whose interval is so short that the number of a multiple would not be exact.
+  !> Reports sources whose interval is too short for the entries to be counted exactly.
   subroutine check_sources(settings, groups, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
     real(real64), parameter :: most = 1.0e15_real64
-    real(real64) :: last                                ! last time of a source that is known [time]
+    real(real64) :: last                                ! latest known time of an entry [time]
     integer :: s(2), k
 
     s = range_of(groups, ["source"])
@@ -554,7 +558,8 @@ contains
     end do
   end subroutine check_sources
 
-  !> Reports an interval so short that more than `most` intervals would elapse before stop.time.
+  !> Reports an interval so short that the time limit stop.time comprises more than `most`
+  !> intervals.
   subroutine check_number(group, name, of_what, most, rule, groups, problems)
     character(len=*), intent(in) :: group, name, of_what
     real(real64), intent(in) :: most

@@ -1,4 +1,5 @@
-!> Converts the species of the input to settings: names, placement, velocities, and relations between species.
+!> Converts the species of the input to settings: names, placement, velocities, and relations
+!> between species.
 module input_species
   use kinds, only: int64, pi, real64
   use box_geometry, only: box_t
@@ -20,10 +21,9 @@ module input_species
 
 contains
 
-  !> Fills the settings of all species. Calculated values are also stored in the groups of the
-  !> input.
+  !> Reads the settings of all species. Derived values are also stored in the groups of the input.
   subroutine take_species(groups, box, seed, species, problems)
-    type(group_t), intent(inout) :: groups(:)             !! the species
+    type(group_t), intent(inout) :: groups(:)             !! groups of the species
     type(box_t), intent(in) :: box
     integer(int64), intent(in) :: seed                    !! seed of the run
     type(species_settings_t), allocatable, intent(out) :: species(:)
@@ -65,7 +65,7 @@ contains
     end do
   end subroutine take_species
 
-  !> Sets the method and the parameters of the initial positions.
+  !> Reads how the initial positions are generated.
   subroutine take_placement(group, box, s, problems)
     type(group_t), intent(in) :: group
     type(box_t), intent(in) :: box
@@ -87,7 +87,7 @@ contains
     if (group%values(row_of("species", "region"))%is_set()) s%region = group%reals_of("region")
   end subroutine take_placement
 
-  !> Sets the polydispersity, and whether the masses depend on the radii.
+  !> Reads the polydispersity, and whether the masses depend on the radii.
   subroutine take_spread(group, s, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(inout) :: s
@@ -104,8 +104,8 @@ contains
       "has no effect on the radii of a file; give their mean as radius", problems)
   end subroutine take_spread
 
-  !> Sets the number of disks, which is given or follows from variables of the placement. A
-  !> number that follows from an initial-configuration file is set later by `input_fit`.
+  !> Determines the number of disks, which is given explicitly or implied by the placement. A number
+  !> implied by an initial-configuration file is determined later, by `input_fit`.
   subroutine take_count(group, s, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(inout) :: s
@@ -132,8 +132,8 @@ contains
     end if
   end subroutine take_count
 
-  !> Checks the number of waiting disks, whose radii and masses must be in the input: initial-configuration files contain no waiting
-  !> disks.
+  !> Checks the number of waiting disks. Their radii and masses must be given in the input, because
+  !> initial-configuration files contain no waiting disks.
   subroutine check_waiting(group, s, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
@@ -146,7 +146,7 @@ contains
     if (s%mass_in_file) call group%complain("waiting", "needs mass: the file contains no waiting disks", problems)
   end subroutine check_waiting
 
-  !> Sets the method and the parameters of the initial velocities.
+  !> Reads how the initial velocities are generated.
   subroutine take_velocities(group, s, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(inout) :: s
@@ -170,14 +170,14 @@ contains
     end associate
   end subroutine take_velocities
 
-  !> Shares the variable that must have the same value for all species, if their placement moves all
-  !> disks.
+  !> Sets the variable that must be equal for all species of a placement that moves all disks:
+  !> species in which it is not given receive the value of another species.
   subroutine share_variable(groups, species, problems)
     type(group_t), intent(inout) :: groups(:)
     type(species_settings_t), intent(inout) :: species(:)
     type(problem_list_t), intent(inout) :: problems
     type(group_fields_t) :: fields
-    integer :: k, giver                                 ! giver: index of the first species with a given value, or 0
+    integer :: k, giver                                 ! giver: first species with a given value, or 0
 
     giver = findloc([(groups(k)%given(common_variable), k=1, size(groups))], .true., dim=1)
     do k = 1, merge(size(groups), 0, giver > 0)
@@ -194,8 +194,8 @@ contains
     end do
   end subroutine share_variable
 
-  !> Sets the masses and radii of all species. If a species is relative to another one that is
-  !> itself relative to a third, the factors are multiplied.
+  !> Determines the masses and radii of all species. If a species is relative to a second one, which
+  !> is relative to a third, the factors are multiplied.
   subroutine resolve_sizes(groups, seed, species, problems)
     type(group_t), intent(in) :: groups(:)
     integer(int64), intent(in) :: seed
@@ -203,7 +203,8 @@ contains
     type(problem_list_t), intent(inout) :: problems
     real(real64), dimension(size(species)) :: mass, radius
     character(len=:), allocatable :: wanted
-    integer :: base(size(species)), k, j, step            ! base: index of the species that `relative_to` names, or 0
+    ! base: index of the species in `relative_to`, or 0
+    integer :: base(size(species)), k, j, step
     logical :: fits
 
     do k = 1, size(species)
@@ -242,9 +243,9 @@ contains
     species%mean_radius = species%radius
   end subroutine resolve_sizes
 
-  !> Finds the radius of a species: the given radius or, with `relative_to`, the factor relative to
-  !> the radius of another species, or the radius that follows from the packing fraction; 0 if it is
-  !> unknown.
+  !> Determines the radius of a species from one of three values: the radius itself, the factor
+  !> relative to the radius of another species (with `relative_to`), or the packing fraction. The
+  !> result is 0 if the radius is unknown.
   subroutine find_radius(group, s, number, seed, radius, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
@@ -258,7 +259,7 @@ contains
     relative = group%given("relative_to")
     radius = group%real_of("radius", 0.0_real64)
     if (group%given("packing_fraction") .and. (given .or. relative)) then
-      radius = 0                                        ! `input_groups` reports variables that exclude each other
+      radius = 0                                        ! exclusions are reported by `input_groups`
     else if (group%given("packing_fraction")) then
       if (s%count > 0 .and. area(s%region) > 0) &
         radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))
@@ -270,10 +271,10 @@ contains
     end if
   end subroutine find_radius
 
-  !> Checks the name of an obstacle or species, which must be unique and valid in paths of the
+  !> Checks the name of an obstacle or species. The name must be unique, and valid in paths of the
   !> output file, in overrides and in messages.
   subroutine check_name(groups, k, problems)
-    type(group_t), intent(in) :: groups(:)                !! the groups of all obstacles, or of all species
+    type(group_t), intent(in) :: groups(:)                !! groups of all obstacles, or of all species
     integer, intent(in) :: k
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: name
@@ -286,14 +287,14 @@ contains
     else if (any([own_names() == name, beside_species == name, drive_counters == name])) then
       call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
     end if
-    do j = 1, k - 1                                       ! a loop, because an array expression would copy all names
+    do j = 1, k - 1                                       ! an array expression would copy all names
       if (groups(j)%instance == name) exit
     end do
     if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the group in line "// &
       written(groups(j)%line), problems)
   end subroutine check_name
 
-  !> Area of a region; 0 if the lower limits of the region exceed its upper limits.
+  !> Area of a region; 0 if the lower limits exceed the upper limits.
   pure function area(region)
     real(real64), intent(in) :: region(4)                 !! xlo, xhi, ylo, yhi [length]
     real(real64) :: area

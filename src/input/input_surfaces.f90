@@ -23,9 +23,9 @@ module input_surfaces
 
 contains
 
-  !> Adds the obstacles to the box, unless one of the obstacles is incomplete.
+  !> Adds the obstacles to the box, unless one of them is incomplete.
   subroutine take_obstacles(groups, box, problems)
-    type(group_t), intent(inout) :: groups(:)             !! all groups whose name is in `obstacle_groups`
+    type(group_t), intent(inout) :: groups(:)             !! all groups with a name in `obstacle_groups`
     type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
     logical :: complete
@@ -39,7 +39,7 @@ contains
       call check_angles(groups(k), problems, complete)
       do v = 1, size(groups(k)%values)
         associate (value => groups(k)%values(v))
-          if (table(value%row)%status /= "example") cycle           ! only variables with the status "example" must be given
+          if (table(value%row)%status /= "example") cycle      ! only variables with this status are required
           if (.not. has_many(groups(k))) call groups(k)%demand(trim(value%name), problems)
           complete = complete .and. value%is_set()
         end associate
@@ -67,9 +67,9 @@ contains
 
   contains
 
-    !> The straight walls of a group.
+    !> Straight walls of a group.
     subroutine take_walls(from, to)
-      real(real64), intent(in) :: from(:), to(:)          !! x and y of the two end points of each wall [length]
+      real(real64), intent(in) :: from(:), to(:)      !! x and y of the two end points of each wall [length]
       integer :: i
 
       do i = 1, size(to)/2
@@ -77,9 +77,10 @@ contains
       end do
     end subroutine take_walls
 
-    !> The arcs of a group, which all extend between the same two angles.
+    !> Arcs of a group, all of which extend from the same angle to the same angle.
     subroutine take_arcs(centre, radius, from_angle, to_angle)
-      real(real64), intent(in) :: centre(:)               !! x and y of the centre of the circle of each arc [length]
+      !> x and y of the centre of curvature of each arc [length].
+      real(real64), intent(in) :: centre(:)
       real(real64), intent(in) :: radius(:)               !! [length]
       real(real64), intent(in) :: from_angle, to_angle    !! [degrees]
       integer :: i
@@ -89,7 +90,7 @@ contains
       end do
     end subroutine take_arcs
 
-    !> The circles of a group.
+    !> Circles of a group.
     subroutine take_circles(centre, radius, encloses)
       real(real64), intent(in) :: centre(:)               !! x and y of the centre of each circle [length]
       real(real64), intent(in) :: radius(:)               !! [length]
@@ -102,7 +103,7 @@ contains
     end subroutine take_circles
   end subroutine take_obstacles
 
-  !> Whether a group describes several obstacles, by a file or a polyline.
+  !> True if a group describes several obstacles, by a file or a polyline.
   pure function has_many(group) result(yes)
     type(group_t), intent(in) :: group
     logical :: yes
@@ -110,7 +111,7 @@ contains
     yes = has(group, "file") .or. has(group, "points")
   end function has_many
 
-  !> Whether the group contains a variable with the given name that the user has set.
+  !> True if the group contains a variable of this name and the user has set it.
   pure function has(group, name) result(yes)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name
@@ -119,11 +120,12 @@ contains
     yes = any(group%values%name == name .and. group%values%given)
   end function has
 
-  !> Reads the obstacles from the file of a group, and stores their data as lists of values in the variables for a single obstacle.
+  !> Reads the obstacles of a group from its file. Their data are stored as lists of values, in the
+  !> variables that otherwise describe a single obstacle.
   subroutine take_file(group, problems)
     type(group_t), intent(inout) :: group
     type(problem_list_t), intent(inout) :: problems
-    real(real64), allocatable :: rows(:, :)               ! (columns,n)
+    real(real64), allocatable :: rows(:, :)               ! shape (columns, n)
     type(error_t), allocatable :: error
 
     if (.not. has(group, "file")) return
@@ -159,8 +161,8 @@ contains
     end associate
   end subroutine take_points
 
-  !> Reports an arc with only one angle, or one that does not extend counter-clockwise by at most
-  !> one turn.
+  !> Reports an arc with only one angle, and an arc that does not extend counter-clockwise or
+  !> extends by more than one turn.
   subroutine check_angles(group, problems, complete)
     type(group_t), intent(in) :: group
     type(problem_list_t), intent(inout) :: problems
@@ -183,12 +185,12 @@ contains
     complete = .false.
   end subroutine check_angles
 
-  !> Sets the contact laws of all sides and obstacles, and the motions of all sides. Values not
-  !> given in a group are taken from `&contact`.
+  !> Reads the contact laws of all sides and obstacles, and the motions of all sides. Values missing
+  !> in a group are taken from `&contact`.
   subroutine take_wall_laws(sides, obstacles, otherwise, box, problems)
     type(group_t), intent(inout) :: sides(:)
     type(group_t), intent(inout) :: obstacles(:)
-    type(wall_law_t), intent(in) :: otherwise             !! default law
+    type(wall_law_t), intent(in) :: otherwise             !! default contact law
     type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
     integer :: k, side, line_of(n_sides)
@@ -218,7 +220,7 @@ contains
         if (box%open(side) .and. box%side(side)%moves()) call sides(k)%complain("open", "cannot be combined with " &
           //"side.motion = '"//sides(k)%text_of("motion")//"' of the same side", problems)
         if (.not. box%side(side)%moves()) cycle
-        ! Opposite sides must not touch each other, whatever the phases of their motions.
+        ! Opposite sides must never touch, whatever the phases of their motions.
         if (width > 0 .and. sum(box%side(2*axis - 1:2*axis)%innermost_position()) >= width) call sides(k)%complain( &
           box%side(side)%motion%culprit(), "lets the sides meet, which are "//written(width)//" apart (box.upper)", problems)
       end if
@@ -229,8 +231,8 @@ contains
 
   contains
 
-    !> Sets the contact law of one side or obstacle. Values taken from `&contact` are also stored in
-    !> its group.
+    !> Reads the contact law of one side or obstacle. Values taken from `&contact` are also stored
+    !> in the group.
     subroutine take_law(group, law)
       type(group_t), intent(inout) :: group
       type(wall_law_t), intent(out) :: law
@@ -255,12 +257,12 @@ contains
         "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
     end subroutine take_law
 
-    !> Sets the motion of a side.
+    !> Reads the motion of a side.
     subroutine take_motion(group, place)
       type(group_t), intent(in) :: group
       type(side_t), intent(out) :: place
       type(group_fields_t) :: fields
-      real(real64) :: offset                              ! displacement inwards at the start of the motion [length]
+      real(real64) :: offset      ! displacement inwards when the motion starts [length]
 
       if (group%faulty("motion")) return
       call choose_motion(group%text_of("motion"), place%motion)
@@ -279,7 +281,7 @@ contains
 
   end subroutine take_wall_laws
 
-  !> Reports coefficients of restitution smaller than the viscoelastic law allows.
+  !> Reports coefficients of restitution below the minimum of the viscoelastic law.
   subroutine check_least(group, name, by_speed, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name
@@ -291,8 +293,8 @@ contains
       problems)
   end subroutine check_least
 
-  !> Sets the tangential contact law of disks or walls from the variables `tangential_restitution` and `friction` with the given
-  !> prefix.
+  !> Reads the tangential contact law of disks or walls from the variables
+  !> PREFIX`tangential_restitution` and PREFIX`friction`.
   subroutine take_grip(group, prefix, otherwise, grip, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: prefix

@@ -1,9 +1,8 @@
 !> Reads the text of an input file and splits it into lines and tokens. The namelist reader of
-!> Fortran accepts some invalid texts without a message, names neither the line nor the variable in
-!> its messages, and can crash. This module and `namelist_input` therefore use a small and strict
-!> grammar of their own. A group has the form `&group name = value, value name(2) = value name =
-!> 3*value /`, and a comment begins with `!`. Any other text is reported as an error with its line
-!> number.
+!> Fortran accepts some invalid texts silently, names neither the line nor the variable in its
+!> messages, and can crash. Therefore this module and `namelist_input` implement a small, strict
+!> grammar. A group has the form `&group name = value, value name(2) = value name = 3*value /`, and
+!> a comment starts with `!`. Any other text is an error, reported with its line number.
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
@@ -14,18 +13,17 @@ module input_text
   public :: read_text, unix_lines
   public :: assignment_t, content, cut, plain, token_t, word, unclosed, ending
 
-  integer(int64), parameter :: largest_file = 4194304   !! bytes
+  integer(int64), parameter :: largest_file = 4194304   !! [bytes]
   integer, private :: i
   character(len=1), parameter :: control(*) = [(achar(i), i=0, 8), achar(11), achar(12), (achar(i), i=14, 31), achar(127)]
 
-  !> Kinds of tokens. A single character such as & or = is its own kind, and the kind of a quoted
+  !> Kinds of tokens. A single character such as & or = is a kind of its own; the kind of a quoted
   !> string is its quotation mark.
   character(len=1), parameter :: word = "w", unclosed = "u", junk = "?", ending = "e"
   character(len=*), parameter :: blanks = " "//achar(9), quotes = "'""", marks = "&/=,()"
   character(len=*), parameter :: word_characters = digits//".+-"//letters//"_*%#:$@?<>|[]{}~^`\"
 
-  !> A token. `first` and `last` are the positions of its first and last character in the text,
-  !> including quotation marks.
+  !> A token, from character `first` to character `last` of the text, including quotation marks.
   type :: token_t
     character(len=1) :: kind
     integer :: first, last, line
@@ -33,11 +31,13 @@ module input_text
   end type token_t
 
   type :: assignment_t
-    integer :: line = 0                          !! line number in the input file, or the negative integer -k for override number k
+    !> Line number in the input file, or -k for override number k.
+    integer :: line = 0
     character(len=:), allocatable :: where       !! group.variable, for messages
-    integer :: element = 0                       !! index of an element, such as 2 in name(2) = value; 0 without an index
-    type(token_t), allocatable :: tokens(:)      !! tokens of the values of the assignment
-    logical :: sound = .true.                    !! .false. if a problem of the assignment has been reported
+    !> Index of the assigned element, such as 2 in name(2) = value; 0 without an index.
+    integer :: element = 0
+    type(token_t), allocatable :: tokens(:)      !! tokens of the assigned values
+    logical :: sound = .true.                    !! .false. after a problem of the assignment was reported
   end type assignment_t
 
 contains
@@ -73,7 +73,7 @@ contains
       " is a control character, code "//written(iachar(text(odd:odd))))
   end subroutine read_text
 
-  !> Suggests an existing input file if the path lacks only the extension or the folder `input`.
+  !> Suggests an existing input file if the path only lacks the extension or the folder `input`.
   function advice(path)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: advice
@@ -89,8 +89,7 @@ contains
     if (advice /= "") advice = "; did you mean "//advice//"?"
   end function advice
 
-  !> Converts a text to a normal form, in which every line ends in a line feed and there is no byte
-  !> order mark.
+  !> Normalises the line ends of a text to line feeds, and removes a byte order mark.
   pure function unix_lines(text) result(lines)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: lines
@@ -112,10 +111,10 @@ contains
     lines = lines(:n)//eol
   end function unix_lines
 
-  !> Splits a text into tokens. Several tokens of kind `ending` follow the last one, so that a
-  !> parser can look ahead beyond it.
+  !> Splits a text into tokens. The list ends with several tokens of kind `ending`, so that a parser
+  !> can look ahead.
   pure subroutine cut(text, tokens)
-    character(len=*), intent(in) :: text         !! every line ends in a line feed
+    character(len=*), intent(in) :: text         !! text whose lines all end in a line feed
     type(token_t), allocatable, intent(out) :: tokens(:)
     character(len=1) :: c
     integer :: at, line, last, n
@@ -152,8 +151,8 @@ contains
 
   contains
 
-    !> Finds the end of a quoted string, which must be in the line in which it begins. Two quotation
-    !> marks in succession represent one.
+    !> Finds the end of a quoted string, which must end in the line in which it begins. A doubled
+    !> quotation mark represents a single one.
     pure subroutine end_quote(token)
       type(token_t), intent(inout) :: token
 
@@ -170,7 +169,7 @@ contains
     end subroutine end_quote
   end subroutine cut
 
-  !> Value of a token. In a quoted string, two quotation marks in succession are replaced by one.
+  !> Value of a token. In a quoted string, doubled quotation marks are replaced by single ones.
   pure function content(text, token) result(value)
     character(len=*), intent(in) :: text
     type(token_t), intent(in) :: token
@@ -189,7 +188,7 @@ contains
     value = value(:n)
   end function content
 
-  !> Converts a name to the form used in messages: a long name is truncated and quoted.
+  !> Formats a name for messages: a long name is truncated and quoted.
   pure function plain(name)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: plain

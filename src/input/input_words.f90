@@ -1,4 +1,5 @@
-!> Converts words of the input to values, and checks numbers, ranges, choices and the number of values.
+!> Converts words of the input to values, and checks numbers, ranges, keywords and the number of
+!> values.
 module input_words
   use kinds, only: int64, real64
   use input_problems, only: most_problems, problem_list_t
@@ -17,11 +18,11 @@ module input_words
 
 contains
 
-  !> Stores the values of an assignment in `slot`. If a value is invalid, the problem is reported
-  !> and `slot` is marked as faulty, without changing its previous value.
+  !> Stores the values of an assignment in `slot`. If a value is invalid, a problem is reported and
+  !> `slot` is marked as faulty, but keeps its previous value.
   subroutine store_values(slot, text, assignment, problems)
     type(value_t), intent(inout) :: slot
-    character(len=*), intent(in) :: text                 !! text to which the tokens refer
+    character(len=*), intent(in) :: text                 !! text that contains the tokens
     type(assignment_t), intent(in) :: assignment
     type(problem_list_t), intent(inout) :: problems
     type(value_t) :: new
@@ -60,7 +61,7 @@ contains
     if (.not. new%faulty) slot = new
   end subroutine store_values
 
-  !> The problem of the number of values in an assignment; empty if there is none.
+  !> Reason why an assignment contains the wrong number of values; empty if the number is correct.
   function number_problem(slot, text, assignment, total) result(problem)
     type(value_t), intent(in) :: slot
     character(len=*), intent(in) :: text
@@ -88,7 +89,7 @@ contains
     end associate
   end function number_problem
 
-  !> Hint for users who have written a real number with a decimal comma, as in `0,9`.
+  !> Hint for users who wrote a real number with a decimal comma, as in `0,9`.
   function decimal_hint(text, tokens) result(hint)
     character(len=*), intent(in) :: text
     type(token_t), intent(in) :: tokens(:)
@@ -97,21 +98,21 @@ contains
 
     hint = ""
     do k = 1, size(tokens), 2
-      if (tokens(k + 1)%first /= tokens(k)%last + 2) return         ! the two numbers are not separated by a comma alone
+      if (tokens(k + 1)%first /= tokens(k)%last + 2) return         ! more than a comma between the numbers
       if (verify(content(text, tokens(k + 1)), digits) > 0) return
     end do
     hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))//"? the decimal sign is a point"
   end function decimal_hint
 
-  !> Checks one word, and stores its value after the n values already stored.
+  !> Checks one word, and stores its value after the first n values.
   subroutine store_token(slot, n, token, word, is_bare, problem)
     type(value_t), intent(inout) :: slot
     integer, intent(in) :: n
     type(token_t), intent(in) :: token
     character(len=*), intent(in) :: word
-    logical, intent(in) :: is_bare                       !! whether strings need no quotation marks, as in overrides
+    logical, intent(in) :: is_bare                       !! .true. in overrides, where strings need no quotes
     character(len=:), allocatable, intent(out) :: problem
-    character(len=:), allocatable :: normal              ! the value in a standard form, such as `.true.` for `T`
+    character(len=:), allocatable :: normal      ! value in a standard form: `.true.` for `T`, for example
     integer(int64) :: whole
     real(real64) :: number
     logical :: quoted
@@ -149,8 +150,8 @@ contains
     end associate
   end subroutine store_token
 
-  !> The problem of a string, which must be quoted (except in overrides), not too long, and one of
-  !> the choices of the variable, if it has any; empty if there is none.
+  !> Reason why a string is invalid: it is not quoted (except in overrides), too long, or not a
+  !> keyword of the variable. The result is empty if the string is valid.
   function text_problem(row, word, quoted) result(problem)
     type(variable_t), intent(in) :: row
     character(len=*), intent(in) :: word
@@ -172,7 +173,7 @@ contains
     end if
   end function text_problem
 
-  !> Whether a word consists of digits with an optional sign.
+  !> True if a word consists of digits with an optional sign.
   pure function is_whole(word)
     character(len=*), intent(in) :: word
     logical :: is_whole
@@ -183,7 +184,7 @@ contains
     is_whole = first <= len(word) .and. verify(word(first:), digits) == 0
   end function is_whole
 
-  !> Reads an integer of at most 64 bits.
+  !> Reads a 64-bit integer.
   pure subroutine read_integer(word, value, problem)
     character(len=*), intent(in) :: word
     integer(int64), intent(out) :: value
@@ -200,15 +201,14 @@ contains
     if (status == 0) problem = ""
   end subroutine read_integer
 
-  !> Reads a decimal number with an optional exponent e or d, as in Fortran. It must be 0 or have an
-  !> absolute value between 1e-100 and 1e100, so that neither overflow nor denormal numbers can
-  !> occur.
+  !> Reads a decimal number with an optional exponent e or d, as in Fortran. Its absolute value must
+  !> be 0 or between 1e-100 and 1e100, so that overflow and denormal numbers are impossible.
   pure subroutine read_real(word, value, problem)
     character(len=*), intent(in) :: word
     real(real64), intent(out) :: value
     character(len=:), allocatable, intent(out) :: problem
     integer, parameter :: longest = 60
-    character(len=longest) :: mantissa                 ! the word without exponent, and with 0 in place of the decimal point
+    character(len=longest) :: mantissa      ! the word without its exponent, with 0 for the decimal point
     integer :: mark, exponent, status
 
     value = 0
@@ -227,7 +227,7 @@ contains
     end if
     problem = ""
     if (scan(word(:mark - 1), "123456789") == 0) return
-    if (abs(exponent) <= 200) then                 ! with such exponents, reading neither overflows nor underflows
+    if (abs(exponent) <= 200) then                 ! such exponents cannot overflow or underflow
       read (word, "(f60.0)", iostat=status) value
       if (status == 0 .and. abs(value) >= smallest .and. abs(value) <= largest) return
     end if

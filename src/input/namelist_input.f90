@@ -1,5 +1,5 @@
-!> Reads the input text and the overrides of `--set`, and converts their tokens to assignments and values. All problems are
-!> collected and reported together.
+!> Parses the input text and the overrides of `--set`: tokens become assignments, and assignments
+!> become values. All problems are collected and reported together.
 module namelist_input
   use input_groups, only: group_t, value_t
   use input_problems, only: most_problems, problem_list_t
@@ -13,25 +13,28 @@ module namelist_input
   private
   public :: read_groups
 
-  !> `most_instances`: largest number of groups with the same name. `most_repeats`: largest repeat count n in n*value.
+  !> Maximum number of groups with the same name, and maximum repeat count n in n*value.
   integer, parameter :: most_instances = 5000, most_repeats = 10000000
 
-  !> A reader of the input, with the groups that it has read so far.
+  !> Parser of the input, with the groups read so far.
   type :: reader_t
-    type(group_t), allocatable :: found(:)          !! (at least n) groups in the order of the text
+    type(group_t), allocatable :: found(:)          !! groups in the order of the text; size at least n
     integer :: n = 0                                !! number of groups found so far
     type(problem_list_t) :: problems
-    logical :: complete = .true.                    !! .false. if parts of the text could not be read
+    logical :: complete = .true.                    !! .false. if part of the text could not be read
     logical :: too_many = .false.                   !! .true. if too many groups have the same name
-    type(value_t), allocatable :: defaults(:)       !! values of the variables that are not set
-    !> The text that is being read: a default, the input text, or an override
+    type(value_t), allocatable :: defaults(:)       !! values of unset variables
+    !> The text being read: a default, the input text, or an override.
     character(len=:), allocatable :: source
     type(token_t), allocatable :: token(:)          !! tokens of `source`
     integer :: at = 1                               !! index of the next token
-    character(len=:), allocatable :: own            !! name of the group that is being read, for messages
-    integer :: group = 0                            !! index of the group that is being read; 0 if its name is unknown
-    integer :: opened = 0                           !! first line of the group that is being read; 0 between groups
-    logical :: quote_open = .false.                 !! .true. after an unclosed quoted text, which may contain the / of the group
+    character(len=:), allocatable :: own            !! name of the group being read, for messages
+    !> Index of the group being read; 0 if its name is unknown.
+    integer :: group = 0
+    !> First line of the group being read; 0 between groups.
+    integer :: opened = 0
+    !> .true. after an unclosed quotation, which may contain the / of the group.
+    logical :: quote_open = .false.
   contains
     procedure :: find_defaults
     procedure :: open_source
@@ -57,20 +60,21 @@ module namelist_input
 
 contains
 
-  !> Reads the text and applies the overrides. Variables that are not set take their defaults.
+  !> Parses the input text and applies the overrides. Unset variables receive their defaults.
   subroutine read_groups(text, overrides, groups, problems, complete)
     character(len=*), intent(in) :: text
     type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
-    type(group_t), allocatable, intent(out) :: groups(:)  !! groups in the order of the table; groups of the same name are adjacent
+    !> Groups in the order of the table; groups of the same name are adjacent.
+    type(group_t), allocatable, intent(out) :: groups(:)
     type(problem_list_t), intent(out) :: problems
-    logical, intent(out) :: complete                                !! .false. if parts of the text could not be read
+    logical, intent(out) :: complete      !! .false. if part of the text could not be read
     type(reader_t) :: reader
     integer :: i, j, k
 
     call reader%find_defaults()
     allocate (reader%found(size(group_names) + n_sides + min(count([(text(k:k) == "&", k=1, len(text))]), &
       count(is_repeated(group_names))*most_instances)))
-    do k = 1, size(group_names)  ! groups that cannot be repeated always exist, even if the text does not contain them
+    do k = 1, size(group_names)  ! groups that cannot be repeated exist even if absent from the text
       if (.not. is_repeated(group_names(k))) call reader%add_group(group_names(k), 0, 1)
     end do
     call reader%open_source(unix_lines(text))
@@ -94,7 +98,7 @@ contains
     end do
   end subroutine read_groups
 
-  !> Finds the values of variables that are not set.
+  !> Determines the values of unset variables.
   subroutine find_defaults(self)
     class(reader_t), intent(inout) :: self
     type(value_t) :: slot
@@ -110,7 +114,7 @@ contains
     end do
   end subroutine find_defaults
 
-  !> Starts to read the tokens of a different text.
+  !> Starts reading the tokens of another text.
   subroutine open_source(self, text)
     class(reader_t), intent(inout) :: self
     character(len=*), intent(in) :: text
@@ -120,7 +124,7 @@ contains
     self%at = 1
   end subroutine open_source
 
-  !> Whether the next tokens have the given kinds.
+  !> True if the next tokens are of the given kinds.
   function follow(self, kinds)
     class(reader_t), intent(in) :: self
     character(len=*), intent(in) :: kinds
@@ -134,7 +138,7 @@ contains
   subroutine add_group(self, name, line, number)
     class(reader_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    !> `line` is the first line of the group, and `number` is its number among the groups of the same name.
+    !> First line of the group, and its number among the groups of the same name.
     integer, intent(in) :: line, number
     integer, allocatable :: rows(:)
     integer :: v
@@ -152,13 +156,13 @@ contains
     end associate
   end subroutine add_group
 
-  !> Stores a value that does not come from the input file: a default or an override, in which strings need no quotation marks.
+  !> Stores a default or an override. Strings in both need no quotes.
   subroutine assign_text(self, slot, text, line, element)
     class(reader_t), intent(inout) :: self
     type(value_t), intent(inout) :: slot
     character(len=*), intent(in) :: text
-    integer, intent(in) :: line  !! the negative integer -k for override number k; 0 for a default
-    integer, intent(in) :: element                      !! index of the element; 0 for all values of the variable
+    integer, intent(in) :: line  !! -k for override number k; 0 for a default
+    integer, intent(in) :: element                      !! index of an array element; 0 for the whole variable
     type(assignment_t) :: assignment
 
     call self%open_source(text//eol)
@@ -175,7 +179,7 @@ contains
     call store_values(slot, self%source, assignment, self%problems)
   end subroutine assign_text
 
-  !> Reads the whole input text.
+  !> Parses the entire input text.
   subroutine read_text(self)
     class(reader_t), intent(inout) :: self
 
@@ -195,7 +199,7 @@ contains
         if (self%follow("&"//word) .and. lower_case(content(self%source, self%token(self%at + 1))) == "end") then
           call self%problems%add(self%token(self%at)%line, self%own, "a group ends with /, not with &end")
           self%at = self%at + 2
-        else if (.not. self%quote_open) then                 ! an unclosed quoted string may contain the end of the group
+        else if (.not. self%quote_open) then      ! an unclosed quotation may contain the end of the group
           call self%problems%add(self%opened, self%own, "the closing / is missing")
         end if
         self%opened = 0
@@ -209,8 +213,8 @@ contains
     end do
   end subroutine read_text
 
-  !> Reads the text between groups, in which only `&name` is allowed. Any other text is reported, and skipped up to the next line
-  !> that begins with &.
+  !> Parses the text between two groups, where only `&name` is allowed. Other text is reported and
+  !> skipped up to the next line that starts with &.
   subroutine between_groups(self)
     class(reader_t), intent(inout) :: self
     character(len=:), allocatable :: problem
@@ -231,7 +235,7 @@ contains
     end do
   end subroutine between_groups
 
-  !> Skips the rest of a line that cannot be interpreted.
+  !> Skips the rest of a line that cannot be parsed.
   subroutine skip_line(self)
     class(reader_t), intent(inout) :: self
     integer :: line
@@ -243,7 +247,7 @@ contains
     end do
   end subroutine skip_line
 
-  !> The text from the next token to the end of its line.
+  !> Text from the next token to the end of its line.
   function rest_of_line(self) result(text)
     class(reader_t), intent(in) :: self
     character(len=:), allocatable :: text
@@ -253,7 +257,7 @@ contains
     end associate
   end function rest_of_line
 
-  !> Reads `name = values`.
+  !> Parses `name = values`.
   subroutine read_assignment(self)
     class(reader_t), intent(inout) :: self
     type(assignment_t) :: assignment
@@ -277,7 +281,7 @@ contains
     end if
   end subroutine read_assignment
 
-  !> Reads the index of an element, such as `(2)` in `name(2) = value`.
+  !> Parses the index of an array element, such as `(2)` in `name(2) = value`.
   subroutine read_element(self, assignment)
     class(reader_t), intent(inout) :: self
     type(assignment_t), intent(inout) :: assignment
@@ -297,7 +301,7 @@ contains
     end if
   end subroutine read_element
 
-  !> Reports a problem of an assignment.
+  !> Reports a problem with an assignment.
   subroutine complain(self, assignment, what)
     class(reader_t), intent(inout) :: self
     type(assignment_t), intent(inout) :: assignment
@@ -307,7 +311,7 @@ contains
     assignment%sound = .false.
   end subroutine complain
 
-  !> Reads the values after `=`, up to the next name, the next `/` or `&`, or the end of the text.
+  !> Parses the values after `=`, up to the next name, the next `/` or `&`, or the end of the text.
   subroutine read_values(self, assignment)
     class(reader_t), intent(inout) :: self
     type(assignment_t), intent(inout) :: assignment
@@ -340,7 +344,7 @@ contains
     assignment%tokens = pack(self%token(first:self%at - 1), self%token(first:self%at - 1)%kind /= ",")
   end subroutine read_values
 
-  !> Reads a value with a repeat count, as in `3*value`. The value may be a quoted text.
+  !> Parses a value with a repeat count, as in `3*value`. The value may be a quoted string.
   subroutine read_repeats(self, assignment)
     class(reader_t), intent(inout) :: self
     type(assignment_t), intent(inout) :: assignment
@@ -360,21 +364,21 @@ contains
       if (own%first <= own%last) return
       if (scan(next%kind, "'"""//unclosed) > 0 .and. next%first == own%first) then
         next%repeats = own%repeats
-        own%kind = ","                                  ! the kind `,` means that the repeat count in the token has been read
+        own%kind = ","                                  ! kind `,`: the repeat count was read
       else
         call self%complain(assignment, "a value is missing after the *")
       end if
     end associate
   end subroutine read_repeats
 
-  !> Finds the group to which the following assignments belong.
+  !> Starts the group to which the following assignments belong.
   subroutine enter_group(self, name)
     class(reader_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer :: instances, g
 
     self%own = plain(name)
-    do g = self%n, 1, -1                                ! `g` becomes 0 if no group has the name
+    do g = self%n, 1, -1                                ! `g` ends at 0 if there is no such group
       if (self%found(g)%name == name) exit
     end do
     self%group = g
@@ -391,7 +395,7 @@ contains
       call self%add_group(name, self%opened, instances + 1)
       self%group = self%n
     else
-      self%problems = problem_list_t()                    ! the rest of the text is not read, and other problems are not reported
+      self%problems = problem_list_t()                    ! reading ends here; other problems are not reported
       call self%problems%add(self%opened, name, "more than "//written(most_instances)//" groups of this name" &
         //trim(merge("; a file may hold many obstacles (file)", repeat(" ", 39), any(obstacle_groups == name))))
       self%too_many = .true.
@@ -427,7 +431,8 @@ contains
     end associate
   end subroutine take_assignment
 
-  !> Reports an unknown variable, suggesting the correct name if it is misspelt, was renamed, or belongs to another group.
+  !> Reports an unknown variable. The message suggests the correct name if the variable is misspelt,
+  !> was renamed, or belongs to another group.
   subroutine report_unknown(self, group, name, line)
     class(reader_t), intent(inout) :: self
     character(len=*), intent(in) :: group, name
@@ -444,7 +449,8 @@ contains
     call self%problems%add(line, trim(group)//"."//plain(name), "unknown variable; "//advice)
   end subroutine report_unknown
 
-  !> Sets the default name of an obstacle, species or source whose name is not given. The default name of a change is its number.
+  !> Assigns a default name to an obstacle, species or source without a name. The default name of a
+  !> change is its number.
   subroutine name_instance(group)
     type(group_t), intent(inout) :: group
 
@@ -454,12 +460,12 @@ contains
     group%instance = group%text_of("name")
   end subroutine name_instance
 
-  !> Applies an override `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`. VARIABLE may be one element of an array, as in
-  !> `gravity(2)`. An empty VALUE restores the default.
+  !> Applies an override `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`. VARIABLE may be an
+  !> element of an array, such as `gravity(2)`. An empty VALUE restores the default.
   subroutine override(self, text, line)
     class(reader_t), intent(inout) :: self
     character(len=*), intent(in) :: text
-    integer, intent(in) :: line                         !! the negative integer -k, where k is the number of the override
+    integer, intent(in) :: line                         !! -k for override number k
     type(value_t) :: slot
     character(len=:), allocatable :: group, instance, name, advice
     integer :: equals, first, last, row, g, element
@@ -499,11 +505,11 @@ contains
     end if
   end subroutine override
 
-  !> Separates the index of an element from the name of a variable. Parentheses that do not contain a number remain part of the
-  !> name.
+  !> Splits a name such as `gravity(2)` into the name of the variable and the index of its element.
+  !> Parentheses without a number stay part of the name.
   subroutine split_element(name, element)
     character(len=:), allocatable, intent(inout) :: name
-    integer, intent(out) :: element                     !! index of the element; set to 0 if the name has no index
+    integer, intent(out) :: element                     !! index of the element; 0 without an index
     integer :: bracket
 
     element = 0
@@ -516,12 +522,12 @@ contains
     if (element > 0) name = name(:bracket - 1)
   end subroutine split_element
 
-  !> If an override sets a sampling interval, removes an interval of a different kind that the file sets for the same samples, so
-  !> that the override replaces it.
+  !> Removes a sampling interval of another kind, set in the file for the same samples, if an
+  !> override sets a sampling interval. The override thereby replaces the interval in the file.
   subroutine replace_cadence(self, g, name)
     class(reader_t), intent(inout) :: self
     integer, intent(in) :: g                            !! index of the group
-    character(len=*), intent(in) :: name                !! name of the variable that the override sets
+    character(len=*), intent(in) :: name                !! variable set by the override
     integer :: v
 
     if (track_of(name) == "") return
@@ -533,8 +539,8 @@ contains
     end do
   end subroutine replace_cadence
 
-  !> Finds the group to which an override refers. The group of a side is created if it does not exist. If any other override does
-  !> not match exactly one group, the problem is reported and g is set to 0.
+  !> Finds the group to which an override refers. A missing group of a side is created. Any other
+  !> override must match exactly one group; otherwise a problem is reported and g is set to 0.
   subroutine find_group(self, group, instance, line, g)
     class(reader_t), intent(inout) :: self
     character(len=*), intent(in) :: group, instance

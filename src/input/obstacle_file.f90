@@ -1,7 +1,7 @@
-!> Reads obstacles from a text file: a line of column names, then one line per obstacle, `x y
-!> radius` for circles or `x1 y1 x2 y2` for straight walls. Empty lines, and text from a # to the
-!> end of its line, are ignored. Obstacles can also be read from an HDF5 file with the datasets
-!> `centre` and `radius`, or `from` and `to`.
+!> Reads obstacles from a text file: a line with the column names, then one line per obstacle with
+!> `x y radius` for circles or `x1 y1 x2 y2` for straight walls. Empty lines are ignored, and so is
+!> text from a # to the end of its line. Obstacles can also be read from an HDF5 file that contains
+!> the datasets `centre` and `radius`, or `from` and `to`.
 module obstacle_file
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: real64
@@ -20,7 +20,7 @@ module obstacle_file
 
 contains
 
-  !> Whether a path has the name of an HDF5 file.
+  !> True if the path has the extension of an HDF5 file.
   pure function is_hdf5(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -33,7 +33,8 @@ contains
   subroutine read_obstacles(path, walls, rows, error)
     character(len=*), intent(in) :: path
     logical, intent(in) :: walls                           !! .true. for straight walls, .false. for circles
-    !> (columns,n) numbers that describe each obstacle, in the order of `of_circles` or `of_walls` [length]
+    !> Numbers that describe each obstacle, in the order of `of_circles` or `of_walls`; shape
+    !> (columns, n) [length].
     real(real64), allocatable, intent(out) :: rows(:, :)
     type(error_t), allocatable, intent(out) :: error
 
@@ -45,7 +46,7 @@ contains
     if (size(rows, 2) == 0 .and. .not. allocated(error)) call fail(error, exit_usage, path//": contains no obstacles")
   end subroutine read_obstacles
 
-  !> Reads the obstacles from an HDF5 file and checks the numbers.
+  !> Reads obstacles from an HDF5 file and checks the numbers.
   subroutine read_hdf5(path, walls, rows, error)
     character(len=*), intent(in) :: path
     logical, intent(in) :: walls
@@ -59,7 +60,7 @@ contains
     if (allocated(error)) return
     do k = 1, size(rows, 2)
       do c = 1, size(rows, 1)
-        wrong = .not. ieee_is_finite(rows(c, k))           ! debug builds stop if NaN is compared
+        wrong = .not. ieee_is_finite(rows(c, k))           ! debug builds stop when NaN is compared
         if (.not. wrong) wrong = abs(rows(c, k)) > largest .or. (c == 3 .and. .not. walls .and. rows(c, k) < smallest)
         if (.not. wrong) cycle
         call fail(error, exit_usage, path//": row "//written(k)//": "//written(rows(c, k))//" is out of range")
@@ -68,16 +69,18 @@ contains
     end do
   end subroutine read_hdf5
 
-  !> Reads the obstacles from a text file.
+  !> Reads obstacles from a text file.
   subroutine read_text(path, walls, rows, error)
     character(len=*), intent(in) :: path
     logical, intent(in) :: walls                           !! .true. for straight walls, .false. for circles
-    !> (columns,n) numbers that describe each obstacle, in the order of `of_circles` or `of_walls` [length]
+    !> Numbers that describe each obstacle, in the order of `of_circles` or `of_walls`; shape
+    !> (columns, n) [length].
     real(real64), allocatable, intent(out) :: rows(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(text_table_t) :: file
     character(len=6), allocatable :: names(:)
-    integer, allocatable :: column(:)  ! index in `names` of each column of the file; empty until the first line has been read
+    ! index in `names` of each column of the file; empty before the first line is read
+    integer, allocatable :: column(:)
     logical :: there
 
     if (walls) allocate (names, source=of_walls)
@@ -97,7 +100,7 @@ contains
     call move_alloc(file%rows, rows)
   end subroutine read_text
 
-  !> Reads the first line, which contains the names of the columns in any order.
+  !> Reads the first line, which contains the column names in any order.
   subroutine read_names(file, names, column)
     type(text_table_t), intent(inout) :: file
     character(len=*), intent(in) :: names(:)
@@ -111,7 +114,7 @@ contains
     end do
   end subroutine read_names
 
-  !> Reads a line that describes one obstacle.
+  !> Reads a line with the numbers of one obstacle.
   subroutine read_row(file, names, column)
     type(text_table_t), intent(inout) :: file
     character(len=*), intent(in) :: names(:)
@@ -144,7 +147,7 @@ contains
     place = path//": row "//written(n)
     if (is_hdf5(path)) return
     call file%open(path, 0, error)
-    do k = 0, n                                            ! the first line contains the names of columns
+    do k = 0, n                                            ! the first line contains the column names
       call file%advance(there)
     end do
     place = path//":"//written(file%number)

@@ -1,7 +1,6 @@
-!> The radii of the disks of a species, which are equal or drawn from a distribution. The
-!> distribution is truncated such that the largest possible radius is ten times the smallest; a
-!> radius outside these limits is drawn again. Polydispersities for which this would happen often
-!> are not allowed.
+!> Radii of the disks of a species: equal, or drawn from a distribution. The distribution is
+!> truncated so that the maximum radius is ten times the minimum; a radius outside these limits is
+!> drawn again. Polydispersities that would often require redrawing are not allowed.
 module radii
   use kinds, only: int64, real64
   use random_stream, only: random_stream_t
@@ -10,16 +9,19 @@ module radii
   private
   public :: drawn_radii, largest_radius, widest_spread
 
-  integer, parameter :: purpose = 7                         !! number that identifies the random streams of this module
-  real(real64), parameter :: part = 9.0_real64/11  !! largest deviation of a radius from the mean radius, divided by the mean radius
-  real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)  !! largest deviation of ln(radius) from its mean
-  !> Smallest allowed distance between the mean and the limits of the distribution, in standard deviations.
+  !> Key of the random streams of this module.
+  integer, parameter :: purpose = 7
+  !> Maximum deviation of a radius from the mean radius, relative to the mean.
+  real(real64), parameter :: part = 9.0_real64/11
+  !> Maximum deviation of ln(radius) from its mean.
+  real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)
+  !> Minimum distance from the mean to the limits of the distribution, in standard deviations.
   real(real64), parameter :: deviations = 3
 
 contains
 
-  !> Draws the radius of each disk. The logarithm of a lognormal radius has the variance
-  !> ln(1+polydispersity**2). The last bits of lognormal and Gaussian radii may depend on the
+  !> Draws the radius of each disk. For a lognormal distribution, ln(radius) has the variance ln(1 +
+  !> polydispersity**2). The last bits of lognormal and Gaussian radii may depend on the
   !> mathematical library.
   pure function drawn_radii(species, s, seed) result(radius)
     class(species_settings_t), intent(in) :: species
@@ -50,7 +52,8 @@ contains
     end do
   end function drawn_radii
 
-  !> Estimates the largest radius of a species without drawing the radii.
+  !> Estimates the maximum radius of a species without drawing the radii. Gaussian and lognormal
+  !> radii are assumed to lie within five standard deviations of the distribution.
   pure function largest_radius(species) result(radius)
     class(species_settings_t), intent(in) :: species
     real(real64) :: radius                                  !! [length]
@@ -71,9 +74,10 @@ contains
     end associate
   end function largest_radius
 
-  !> Largest allowed polydispersity for a kind of distribution.
+  !> Maximum polydispersity allowed for a distribution.
   pure function widest_spread(distribution) result(spread)
-    character(len=*), intent(in) :: distribution            !! kind of distribution: 'uniform', 'gaussian' or 'lognormal'
+    !> 'uniform', 'gaussian' or 'lognormal'
+    character(len=*), intent(in) :: distribution
     real(real64) :: spread
 
     spread = part/merge(sqrt(3.0_real64), deviations, distribution == "uniform")

@@ -1,5 +1,5 @@
-!> The settings of a run as typed data, from the input file, the overrides and the defaults. The
-!> meaning, range and unit of each variable are described in `variables`.
+!> The settings of a run as typed data, obtained from the input file, the overrides and the
+!> defaults. The module `variables` describes the meaning, range and unit of each variable.
 module settings
   use kinds, only: int64, never, real64
   use disks, only: species_t
@@ -13,93 +13,104 @@ module settings
   private
   public :: run_input_t, settings_t, run_settings_t, sampling_t, species_settings_t, output_settings_t, disks_in_file_t
 
-  !> Smallest number of disks for which domains save time even on one core, because the data of one
+  !> Minimum number of disks for which domains save time even on one core, because the data of one
   !> domain fit into the cache.
   integer, parameter :: many_disks = 500000
 
   type :: run_settings_t
     character(len=:), allocatable :: title
     integer(int64) :: seed
-    character(len=:), allocatable :: dynamics         !! method of advancing in time: 'events' or 'steps'
-    real(real64) :: dt                                !! time step if `dynamics` is 'steps' [time]
-    character(len=:), allocatable :: search           !! method of the neighbour search: 'cells', 'pairs' or 'rescan'
-    character(len=:), allocatable :: queue            !! kind of the event queue: 'calendar' or 'heap'
-    !> Number of threads; 0 to take it from the environment when the threads are started.
+    character(len=:), allocatable :: dynamics         !! how time advances: 'events' or 'steps'
+    real(real64) :: dt                                !! time step, for `dynamics` = 'steps' [time]
+    !> Neighbour search: 'cells', 'pairs' or 'rescan'.
+    character(len=:), allocatable :: search
+    character(len=:), allocatable :: queue            !! event queue: 'calendar' or 'heap'
+    !> Number of threads; 0 to read it from the environment when the threads are started.
     integer :: threads
-    integer :: threads_asked = 1                      !! number of threads that the user requested
+    integer :: threads_asked = 1                      !! number of threads requested by the user
   end type run_settings_t
 
   !> Disks read from a file.
   type :: disks_in_file_t
-    real(real64), allocatable :: table(:, :)          !! (column_names,n) data of each disk; deallocated when the disks are placed
-    logical, allocatable :: there(:)                  !! (column_names) whether the file contains each column
-    integer, allocatable :: rows(:)                   !! (n) line numbers in a text file, or row numbers in the last frame of a run
-    type(error_t), allocatable :: error               !! reason why the file cannot be used; not allocated if the file can be used
+    !> Data of each disk; shape (column_names, n); deallocated once the disks are placed.
+    real(real64), allocatable :: table(:, :)
+    logical, allocatable :: there(:)                  !! whether the file contains each of the `column_names`
+    !> Line number of each disk in a text file, or its row in the last frame of a run.
+    integer, allocatable :: rows(:)
+    !> Reason why the file cannot be used; otherwise not allocated.
+    type(error_t), allocatable :: error
   end type disks_in_file_t
 
   !> A species and its initial state.
   type, extends(species_t) :: species_settings_t
-    !> Radius of each disk, or the largest radius if radii are drawn or from a file [length]
+    !> Radius of each disk; the maximum if radii are drawn or read from a file [length].
     real(real64) :: radius = 0.0_real64
     real(real64) :: mean_radius = 1.0_real64          !! mean of the radius distribution [length]
-    !> Standard deviation of the radii divided by their mean; 0 if all radii are equal.
+    !> Standard deviation of the radii divided by their mean; 0 for equal radii.
     real(real64) :: polydispersity = 0.0_real64
-    character(len=:), allocatable :: distribution     !! distribution of the radii: 'uniform', 'gaussian', 'lognormal'
-    !> Whether masses are proportional to the areas of the disks; `mass` is then that of a disk with
-    !> the mean radius.
+    !> Distribution of the radii: 'uniform', 'gaussian' or 'lognormal'.
+    character(len=:), allocatable :: distribution
+    !> Whether the masses are proportional to the areas of the disks; `mass` is then the mass of a
+    !> disk with the mean radius.
     logical :: mass_by_area = .false.
-    logical :: mass_in_file = .false.                 !! .true. to read masses from the file, if the file contains masses
+    logical :: mass_in_file = .false.      !! .true. to read masses from the file if it contains them
     logical :: radius_in_file = .false.               !! .true. if radii are read from the file
     logical :: spin_in_file = .false.                 !! .true. if angular velocities are read from the file
     logical :: angle_in_file = .false.                !! .true. if the file contains orientations
-    integer :: waiting = 0                            !! number of disks that wait outside of the box at the start
-    logical :: is_base = .false.                      !! .true. if masses and radii of other species are relative to this species
+    integer :: waiting = 0                            !! number of disks outside the box at the start
+    !> .true. if masses and radii of other species are relative to this species.
+    logical :: is_base = .false.
     real(real64) :: region(4)                         !! xlo, xhi, ylo, yhi [length]
-    class(placement_t), allocatable :: placement      !! method of the initial positions
-    character(len=:), allocatable :: file             !! text file, or HDF5 file of a run; empty if there is none
-    !> .true. to scale positions from the output of another run to the box of this run
+    class(placement_t), allocatable :: placement      !! method of generating the initial positions
+    character(len=:), allocatable :: file      !! text file, or HDF5 file of a run; empty without a file
+    !> .true. to scale the positions in another run's output to the box of this run.
     logical :: scale_positions = .false.
     type(disks_in_file_t) :: in_file
-    !> Method of the initial velocities: 'rest', 'equal_speed', 'uniform', 'maxwell', 'explicit', 'file'
+    !> How the initial velocities are generated: 'rest', 'equal_speed', 'uniform', 'maxwell',
+    !> 'explicit' or 'file'.
     character(len=:), allocatable :: velocities
-    !> Speed for 'equal_speed', and largest velocity component for 'uniform' [length/time]
+    !> Speed for 'equal_speed'; maximum of each velocity component for 'uniform' [length/time].
     real(real64) :: speed
     real(real64) :: temperature                       !! kT for 'maxwell' [energy]
-    real(real64) :: exact_temperature = -1.0_real64   !! kT to which velocities are scaled; negative if it is not given [energy]
-    !> Given velocities for 'explicit': shape (2,count), or (2,1) if all disks have the same velocity; otherwise shape (2,0)
+    !> kT to which the velocities are scaled; negative if it is not set [energy].
+    real(real64) :: exact_temperature = -1.0_real64
+    !> Velocities for 'explicit': shape (2,count), or (2,1) if all disks have the same velocity. For
+    !> other methods the shape is (2,0).
     real(real64), allocatable :: velocity(:, :)
-    real(real64) :: angular_velocity = 0.0_real64     !! angular velocity of all disks [1/time]
-    !> kT of the rotation, the mean of I omega**2; negative if it is not given [energy]
+    real(real64) :: angular_velocity = 0.0_real64     !! common to all disks [1/time]
+    !> Rotational kT, the mean of I omega**2; negative if it is not set [energy].
     real(real64) :: rotational_temperature = -1.0_real64
   contains
     procedure :: count_text
   end type species_settings_t
 
-  !> Quantities that determine when samples are taken, as in the names of variables such as output.frames_every_time.
+  !> Quantities that define sampling intervals, as in the names of variables such as
+  !> output.frames_every_time.
   character(len=19), parameter, public :: sampled_by(4) = [character(len=19) :: "time", "collisions", "events", &
     "collisions_per_disk"]
 
   !> Kinds of samples, as in the names of variables such as output.frames_every_time.
   character(len=11), parameter, public :: sampled(2) = [character(len=11) :: "frames", "observables"]
 
-  !> A sampling schedule. Intervals that the input does not set have the value `never`.
+  !> A sampling schedule. Intervals not set in the input have the value `never`.
   type :: sampling_t
-    real(real64) :: every(4) = never                  !! interval for each quantity in `sampled_by`
-    real(real64), allocatable :: at(:)                !! given sampling times in ascending order [time]
-    integer :: per_decade = 0                         !! number of logarithmic sampling times per decade; 0 if there are none
+    real(real64) :: every(4) = never                  !! interval in each quantity of `sampled_by`
+    real(real64), allocatable :: at(:)      !! sampling times in the input, in ascending order [time]
+    !> Number of logarithmic sampling times per decade; 0 without such times.
+    integer :: per_decade = 0
     real(real64) :: from = never                      !! first logarithmic sampling time [time]
   end type sampling_t
 
   type :: output_settings_t
-    type(sampling_t) :: sampling(2)                   !! schedule for each kind of samples in `sampled`
-    !> Columns of frames in addition to positions; not allocated if frames contain all columns.
+    type(sampling_t) :: sampling(2)                   !! schedule of each kind of samples in `sampled`
+    !> Columns of a frame in addition to the positions; not allocated if frames contain all columns.
     character(len=text_length), allocatable :: frame_columns(:)
-    logical :: single_precision                       !! .true. if frames are stored in single precision
+    logical :: single_precision                       !! .true. to store frames in single precision
     logical :: event_log
-    !> .true. to accumulate the virial tensor even if no other setting requires it
+    !> .true. to accumulate the virial tensor even if no other setting requires it.
     logical :: virial_tensor
     logical :: helfand                                !! .true. to accumulate the Helfand moments
-    real(real64) :: checkpoint_every                  !! wall-clock time between two checkpoints [s]
+    real(real64) :: checkpoint_every                  !! wall time between checkpoints [s]
   end type output_settings_t
 
   type, extends(system_t) :: settings_t
@@ -107,8 +118,9 @@ module settings
     type(species_settings_t), allocatable :: species(:)
     type(stop_settings_t) :: stop
     type(output_settings_t) :: output
-    logical :: has_lids = .false.                     !! whether a side has the variable `open`, so that it can be opened or closed
-    type(change_t), allocatable :: schedule(:)        !! changes during the run, in the order of their times
+    !> Whether the variable `open` of any side is set, so that this side can be opened or closed.
+    logical :: has_lids = .false.
+    type(change_t), allocatable :: schedule(:)        !! changes during the run, in chronological order
   contains
     procedure :: n_disks
     procedure :: choose_features
@@ -120,17 +132,20 @@ module settings
   type :: run_input_t
     character(len=:), allocatable :: path                !! path of the input file, for messages
     character(len=:), allocatable :: text                !! contents of the input file
-    type(text_t), allocatable :: overrides(:)            !! GROUP.VARIABLE=VALUE of each --set
-    real(real64) :: saved_at = -1.0_real64  !! time at which a simulation in memory was saved; negative if it was not saved [time]
-    !> Changes during the run: one line `TIME VARIABLE=VALUE` for each change.
+    type(text_t), allocatable :: overrides(:)            !! GROUP.VARIABLE=VALUE for each --set
+    !> Simulation time at which a simulation in memory was saved; negative if it was not saved
+    !> [time].
+    real(real64) :: saved_at = -1.0_real64
+    !> Changes during the run: one line `TIME VARIABLE=VALUE` for each.
     character(len=:), allocatable :: changes
-    type(group_t), allocatable :: groups(:)    !! groups with all values that the run uses
+    type(group_t), allocatable :: groups(:)    !! groups with all values used in the run
     type(settings_t) :: settings                         !! the values in `groups` as typed data
   end type run_input_t
 
 contains
 
-  !> Part of a message: the number of disks of the species, and whether some of them wait.
+  !> Text for messages: the number of disks of the species, and whether some of them wait outside
+  !> the box.
   pure function count_text(self) result(text)
     class(species_settings_t), intent(in) :: self
     character(len=:), allocatable :: text
@@ -147,8 +162,8 @@ contains
     n = sum(int(self%species%count, int64))
   end function n_disks
 
-  !> Determines the features that the run needs, such as rotation. This must follow the reading of
-  !> initial-configuration files.
+  !> Determines which features the run needs, such as rotation. Initial-configuration files must
+  !> have been read before.
   pure subroutine choose_features(self)
     class(settings_t), intent(inout) :: self
 
@@ -167,7 +182,7 @@ contains
     end associate
   end subroutine choose_features
 
-  !> Whether disks can leave or enter the box.
+  !> True if disks can leave or enter the box.
   pure function is_open(self) result(yes)
     class(settings_t), intent(in) :: self
     logical :: yes
@@ -175,7 +190,8 @@ contains
     yes = self%has_lids .or. allocated(self%source) .or. any(self%species%waiting > 0)
   end function is_open
 
-  !> Whether the run should use domains: with several threads, or with many disks on one core.
+  !> True if the box should be divided into domains: with several threads, or with many disks on one
+  !> core.
   pure function wants_domains(self) result(yes)
     class(settings_t), intent(in) :: self
     logical :: yes

@@ -1,6 +1,6 @@
-!> Reads tables from text files of disks or obstacles. Each line contains the values of one row, and
-!> the first line may contain the names of the columns. Empty lines, and text from a # to the end of
-!> its line, are ignored.
+!> Reads tables of disks or obstacles from text files. Each line contains the values of one row; the
+!> first line may contain the column names. Empty lines are ignored, and so is text from a # to the
+!> end of its line.
 module text_table
   use kinds, only: int64, real64
   use errors, only: error_t, exit_files, exit_usage, fail
@@ -13,19 +13,19 @@ module text_table
 
   integer, parameter :: longest_line = 1024
 
-  !> A table while it is read, line by line.
+  !> A table being read line by line.
   type :: text_table_t
     character(len=:), allocatable :: path
-    character(len=:), allocatable :: problem        !! problem in the present line; "" without a problem
+    character(len=:), allocatable :: problem        !! problem with the present line; "" without a problem
     character(len=:), allocatable :: line           !! the present line
     integer :: number = 0                           !! number of the present line
     integer :: n_words = 0                          !! number of words in the present line
     integer :: n = 0                                !! number of rows read so far
-    real(real64), allocatable :: rows(:, :)         !! (values,at least n) rows read so far
-    integer, allocatable :: lines(:)                !! (at least n) line number of each row
+    real(real64), allocatable :: rows(:, :)         !! rows read so far; shape (values, at least n)
+    integer, allocatable :: lines(:)                !! line number of each row; size at least n
     character(len=:), allocatable, private :: text
-    integer(int64), private :: past = 1             !! position in the text where the next line begins
-    !> Positions of the first and the last character of each word in the present line
+    integer(int64), private :: past = 1             !! position of the start of the next line in the text
+    !> Positions of the first and the last character of each word in the present line.
     integer, private :: first(longest_line) = 0, last(longest_line) = 0
   contains
     procedure :: open => open_table
@@ -40,7 +40,7 @@ module text_table
 
 contains
 
-  !> Opens a file whose rows contain `width` values.
+  !> Opens a file with `width` values per row.
   subroutine open_table(self, path, width, error)
     class(text_table_t), intent(out) :: self
     character(len=*), intent(in) :: path
@@ -53,7 +53,7 @@ contains
     if (self%problem /= "") call fail(error, exit_files, path//": cannot be read: "//self%problem)
   end subroutine open_table
 
-  !> Whether the file begins with the given characters.
+  !> True if the file starts with the given characters.
   pure function begins_with(self, mark) result(yes)
     class(text_table_t), intent(in) :: self
     character(len=*), intent(in) :: mark
@@ -65,7 +65,7 @@ contains
   !> Advances to the next line that contains words.
   subroutine advance(self, there)
     class(text_table_t), intent(inout) :: self
-    logical, intent(out) :: there                   !! .false. at the end of the text, and after a problem
+    logical, intent(out) :: there                   !! .false. at the end of the text and after a problem
     integer(int64) :: begin
 
     do
@@ -85,7 +85,7 @@ contains
     end do
   end subroutine advance
 
-  !> Finds the words in a line.
+  !> Splits a line into words.
   pure subroutine find_words(line, first, last, n)
     character(len=*), intent(in) :: line
     integer, intent(inout) :: first(:), last(:)
@@ -106,7 +106,7 @@ contains
     end do
   end subroutine find_words
 
-  !> The k-th word in the present line.
+  !> Word k of the present line.
   pure function word(self, k)
     class(text_table_t), intent(in) :: self
     integer, intent(in) :: k
@@ -115,16 +115,16 @@ contains
     word = self%line(self%first(k):self%last(k))
   end function word
 
-  !> Requires that the present line contains one value for each of the given columns.
+  !> Reports a problem unless the present line contains one value for each of the given columns.
   pure subroutine require(self, names)
     class(text_table_t), intent(inout) :: self
-    character(len=*), intent(in) :: names(:)        !! names of the columns of the file
+    character(len=*), intent(in) :: names(:)        !! column names of the file
 
     if (self%n_words /= size(names)) &
       self%problem = counted(int(self%n_words, int64), "value")//"; expected: "//joined(names, " ")
   end subroutine require
 
-  !> Reads the k-th word in the present line as a number.
+  !> Converts word k of the present line to a number.
   pure subroutine read_number(self, k, value)
     class(text_table_t), intent(inout) :: self
     integer, intent(in) :: k
@@ -134,7 +134,7 @@ contains
     if (self%problem /= "") self%problem = shown(self%word(k))//" "//self%problem
   end subroutine read_number
 
-  !> Appends a row with the values of the present line.
+  !> Appends a row to the table.
   pure subroutine append(self, values)
     class(text_table_t), intent(inout) :: self
     real(real64), intent(in) :: values(:)
@@ -148,7 +148,7 @@ contains
     self%lines(self%n) = self%number
   end subroutine append
 
-  !> Removes unused space from the rows, and reports the problem of the last line that was read.
+  !> Frees unused space of the table, and reports the problem of the last line read, if any.
   subroutine close_table(self, error)
     class(text_table_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error

@@ -1,5 +1,5 @@
-!> Texts about the input variables: the reference input file, the answers to `--explain`, and JSON
-!> for other programs (the table of variables, and an input with the values as read).
+!> Texts about the input variables: the reference input file, the output of `--explain`, and JSON
+!> for other programs (the table of variables, and an input with its values).
 module variable_help
   use choices, only: meaning_of
   use errors, only: error_t, exit_usage, fail
@@ -13,11 +13,11 @@ module variable_help
   public :: defaults_text, explain, groups_text, input_of, quoted, variables_text
 
   integer, parameter :: comment_column = 40                !! column of the comments in the reference file
-  integer, parameter :: help_width = 100                   !! width of a line of help
+  integer, parameter :: help_width = 100                   !! line width of the help
 
 contains
 
-  !> The reference input file, a valid input that contains every variable with its default.
+  !> The reference input file: a valid input that contains every variable with its default.
   pure function defaults_text() result(text)
     character(len=:), allocatable :: text
     integer :: g, k
@@ -35,8 +35,8 @@ contains
     end do
   end function defaults_text
 
-  !> Beginning of each line of a group in the reference file, where groups that describe boundaries
-  !> or changes are commented out.
+  !> Prefix of the lines of a group in the reference file. Groups of boundaries and changes are
+  !> commented out.
   pure function margin(group)
     character(len=*), intent(in) :: group
     character(len=:), allocatable :: margin
@@ -45,8 +45,8 @@ contains
     if (any(wall_groups == group) .or. group == "source" .or. group == "change") margin = "! "
   end function margin
 
-  !> Lines for a variable in the reference file, with the first sentence of its help text and, if it
-  !> has keywords, its choices.
+  !> Lines of a variable in the reference file, with the first sentence of its help text and its
+  !> keywords, if it has any.
   pure function reference_line(row) result(line)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: line
@@ -63,7 +63,7 @@ contains
     if (row%choices /= "") line = line//eol//next//allowed(row)
   end function reference_line
 
-  !> Pads a text with blanks up to the column of comments.
+  !> Pads a line with blanks up to the column of comments.
   pure function padded(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: padded
@@ -71,8 +71,8 @@ contains
     padded = text//repeat(" ", max(comment_column - len(text), 0))
   end function padded
 
-  !> Answers `--explain`. The topic is the name of a variable, with or without its group, or the name of a group. Any other topic is
-  !> searched for in names, choices and help texts.
+  !> Output of `--explain`. The topic is a variable, with or without its group, or a group. Any
+  !> other topic is searched for in names, keywords and help texts.
   pure subroutine explain(name, text, error)
     character(len=*), intent(in) :: name
     character(len=:), allocatable, intent(out) :: text
@@ -107,7 +107,7 @@ contains
     end if
   end subroutine explain
 
-  !> Explanations of the variables in the given rows.
+  !> Explanations of several variables.
   pure function explanations(rows) result(text)
     integer, intent(in) :: rows(:)                         !! row numbers in the table of variables
     character(len=:), allocatable :: text
@@ -120,7 +120,7 @@ contains
   end function explanations
 
   !> Name of a variable without the index of an element and without the name of a species or
-  !> boundary: `species.velocity` for `species.gas.velocity(2)`, for example.
+  !> boundary. For example, `species.gas.velocity(2)` becomes `species.velocity`.
   pure function bare(name)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: bare
@@ -132,10 +132,10 @@ contains
     if (last > first) bare = bare(:first)//bare(last + 1:)
   end function bare
 
-  !> Lists each variable whose name or help text contains the wanted text, and each choice whose
-  !> name or meaning contains it.
+  !> Search results of `--explain`: all variables with the wanted text in the name or help text, and
+  !> all keywords with the wanted text in the keyword or its meaning.
   pure function matches(wanted) result(text)
-    character(len=*), intent(in) :: wanted                 !! the text, in lower case
+    character(len=*), intent(in) :: wanted                 !! the wanted text in lower case
     character(len=:), allocatable :: text
     integer :: k, c
 
@@ -152,8 +152,8 @@ contains
     text = text(len(eol) + 1:)
   contains
 
-    !> Whether a text contains the wanted text. Underscores and blanks are equivalent, as in `packing_fraction` and `packing
-    !> fraction`.
+    !> True if a text contains the wanted text. Underscores and blanks are equivalent, as in
+    !> `packing_fraction` and `packing fraction`.
     pure function has(where) result(yes)
       character(len=*), intent(in) :: where
       logical :: yes
@@ -161,7 +161,7 @@ contains
       yes = index(spaced(lower_case(where)), spaced(wanted)) > 0
     end function has
 
-    !> Replaces the underscores in a text by blanks.
+    !> Replaces underscores by blanks.
     pure function spaced(name)
       character(len=*), intent(in) :: name
       character(len=len(name)) :: spaced
@@ -174,7 +174,7 @@ contains
     end function spaced
   end function matches
 
-  !> Row of a variable in the table, as a text with one line for each property.
+  !> Explanation of a variable, with one line for each property.
   pure function explanation(k) result(text)
     integer, intent(in) :: k                               !! row number in the table of variables
     character(len=:), allocatable :: text
@@ -197,7 +197,7 @@ contains
     end associate
   end function explanation
 
-  !> Default of a variable, or a description of what happens if it is not given.
+  !> Default of a variable, or a description of the behaviour if the variable is not set.
   pure function default_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -212,9 +212,9 @@ contains
     end if
   end function default_of
 
-  !> Condition under which a variable has an effect, such as a choice of another variable; empty if
-  !> it always has. A variable of `&species` that needs a choice which the user has not made implies
-  !> this choice.
+  !> Condition under which a variable has an effect, such as a choice made by another variable;
+  !> empty if it always has an effect. In `&species`, setting the variable implies the choice if the
+  !> user has not made one.
   pure function condition_of(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -228,7 +228,7 @@ contains
     end associate
   end function condition_of
 
-  !> Text that states when a variable may be changed after the start of a run.
+  !> States when a variable may be changed after the start of a run.
   pure function change_text(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
@@ -239,7 +239,8 @@ contains
       //"--resume"
   end function change_text
 
-  !> Converts the table of variables to JSON: each group is an object that contains an object for each variable.
+  !> Converts the table of variables to JSON: one object per group, which contains one object per
+  !> variable.
   pure function variables_text() result(text)
     character(len=:), allocatable :: text, between
     integer :: g, k
@@ -260,7 +261,7 @@ contains
   end function variables_text
 
   !> Converts a row of the table of variables to JSON. The bounds of a number are called `from` and
-  !> `to` if they are allowed values, and `above` and `below` if they are not.
+  !> `to` if the bounds themselves are allowed, otherwise `above` and `below`.
   pure function row_text(k) result(text)
     integer, intent(in) :: k                               !! row number in the table of variables
     character(len=:), allocatable :: text, value, meanings
@@ -305,10 +306,10 @@ contains
       member("changeable", .true., trim(merge("true ", "false", row%may_change == in_motion)))
   end function row_text
 
-  !> Converts the groups of an input to JSON, in the order of the file, with only the variables that
-  !> the user has given. `from` and `to` are the positions of the first and last byte of the group
-  !> in the file, and null if the file does not contain the group. Positions start at 0, and refer
-  !> to the text without a byte order mark and with line feeds as line ends.
+  !> Converts the groups of an input to JSON, in the order of the file and only with the variables
+  !> set by the user. `from` and `to` are the positions of the first and the last byte of the group
+  !> in the file, or null if the file does not contain the group. Positions start at 0 and refer to
+  !> the text without a byte order mark and with line feeds as line ends.
   pure function groups_text(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -338,8 +339,8 @@ contains
     text = "["//growing%text()//eol//"]"
   end function groups_text
 
-  !> Converts groups to the text of an input file with the same content. `relative_to` is omitted,
-  !> because the masses and radii of all species have their final values.
+  !> Converts groups to the text of an equivalent input file. `relative_to` is left out, because the
+  !> masses and radii of all species are final.
   pure function input_of(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
@@ -375,8 +376,7 @@ contains
     text = growing%text()
   contains
 
-    !> The form in which an input file contains a value of kind "integer", "logical" or "text".
-    !> Strings are quoted.
+    !> Formats an integer, a logical or a string as in an input file. Strings are quoted.
     pure function word(kind, value)
       character(len=*), intent(in) :: kind, value
       character(len=:), allocatable :: word
@@ -386,7 +386,7 @@ contains
     end function word
   end function input_of
 
-  !> A string in quotes, as an input file contains it.
+  !> Quotes a string as in an input file.
   pure function quoted(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted
@@ -400,7 +400,7 @@ contains
     quoted = quoted//"'"
   end function quoted
 
-  !> The JSON text `, "name": value`, with null if there is no value.
+  !> The JSON text `, "name": value`, or `, "name": null` without a value.
   pure function member(name, is_there, value) result(text)
     character(len=*), intent(in) :: name, value
     logical, intent(in) :: is_there
