@@ -1,4 +1,4 @@
-!> Table rows that describe the variables of the groups `&box`, `&side`, `&obstacle` and `&wall`.
+!> Variables of the groups `&box`, `&side`, `&obstacle` and `&wall`.
 module boundary_variables
   use collisions, only: wall_rules
   use motions, only: motion_rows
@@ -89,7 +89,7 @@ module boundary_variables
       //"started.", excludes="from to points", &
       otherwise="none; the group describes one wall or polyline")]
 
-  !> Variables of the contact law of a boundary, which belong to each of the groups `&side`, `&obstacle` and `&wall`.
+  !> Contact-law variables, which the groups `&side`, `&obstacle` and `&wall` have in common.
   type(variable_t), parameter :: law_rows(*) = [ &
     variable_t("", "restitution", "real", 1, "optional", "0.9", &
       "Coefficient of restitution of disks colliding with this boundary: 1 is elastic, 0 perfectly inelastic. Whether it " &

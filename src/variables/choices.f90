@@ -1,4 +1,4 @@
-!> Descriptions of the choices of text variables.
+!> Meanings of all keywords.
 module choices
   use collisions, only: law_choices, rule_choices
   use drives, only: drive_choices
@@ -58,7 +58,7 @@ module choices
 
 contains
 
-  !> Description of a choice; empty if the table does not contain the choice.
+  !> Meaning of a keyword; empty if the keyword does not exist.
   pure function meaning_of(name, word) result(meaning)
     character(len=*), intent(in) :: name     !! name of the variable
     character(len=*), intent(in) :: word

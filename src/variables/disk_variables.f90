@@ -1,4 +1,4 @@
-!> Table rows that describe the variables of the groups `&species` and `&contact`.
+!> Variables of the groups `&species` and `&contact`.
 module disk_variables
   use collisions, only: restitution_laws, wall_rules
   use placements, only: placement_rows

@@ -1,5 +1,5 @@
-!> Names of variables and choices in earlier versions of the program, and the corresponding present names. If an input contains an
-!> old name, the error message contains the present name.
+!> Names of variables and keywords in earlier versions of the program, with their present names. An
+!> error message about an old name suggests the present name.
 module old_names
   use variables, only: name_length
   implicit none
@@ -8,9 +8,9 @@ module old_names
 
   type :: old_name_t
     character(len=8) :: group
-    !> Old name of the variable; if only a choice was renamed, present name of the variable
+    !> Old name of the variable, or its present name if only a keyword was renamed.
     character(len=name_length) :: name
-    character(len=20) :: choice               !! old name of the choice; blank if the variable itself was renamed
+    character(len=20) :: choice               !! old keyword; blank if the variable was renamed
     character(len=name_length) :: now
   end type old_name_t
 
@@ -33,10 +33,10 @@ module old_names
 
 contains
 
-  !> Present name of a variable or choice that was renamed; empty if the name was never changed.
+  !> Present name of a renamed variable or keyword; empty if the name never changed.
   pure function new_name(group, name, choice) result(now)
     character(len=*), intent(in) :: group, name
-    character(len=*), intent(in) :: choice     !! old name of the choice; blank if the name of a variable is looked up
+    character(len=*), intent(in) :: choice     !! old keyword; blank to look up a variable
     character(len=:), allocatable :: now
     integer :: k
 
@@ -46,8 +46,8 @@ contains
     end do
   end function new_name
 
-  !> Present names of the variables or choices that replace an old variable or choice; empty if no replacement exists. The old name
-  !> of a variable may include its group.
+  !> Present names of the variables or keywords that replace an old one; empty if it was not
+  !> replaced. The old name of a variable may include its group.
   pure function present_names(name, of_choices) result(names)
     character(len=*), intent(in) :: name
     logical, intent(in) :: of_choices

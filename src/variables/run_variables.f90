@@ -1,4 +1,4 @@
-!> Table rows that describe the variables of the groups `&run`, `&change`, `&stop` and `&output`.
+!> Variables of the groups `&run`, `&change`, `&stop` and `&output`.
 module run_variables
   use drives, only: drive_counters
   use sample_values, only: column_words

@@ -1,4 +1,4 @@
-!> Table rows that describe the variables of the group `&source`.
+!> Variables of the group `&source`.
 module source_variables
   use variable_rows, only: in_motion, not_negative, positive, variable_t
   implicit none

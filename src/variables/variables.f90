@@ -1,6 +1,6 @@
-!> The table of all input variables. Several parts of the program use the table of variables: the reading and checking of inputs,
-!> `--print-defaults`, `--explain`, and the group `/parameters` of the output file. The reference page of the documentation is
-!> generated from the table.
+!> The table of all input variables. It is used for reading and checking the input, for
+!> `--print-defaults` and `--explain`, for the group `/parameters` of the output file, and for
+!> generating the reference page of the documentation.
 module variables
   use boundary_variables, only: boundary_rows
   use disk_variables, only: disk_rows
@@ -24,8 +24,8 @@ module variables
 
 contains
 
-  !> Returns on which occasions the value of a variable may be changed after the start of a run. The full name of the variable may
-  !> contain the name of a group, as in `side.left.velocity`.
+  !> When a variable may be changed after the start of a run: `never`, `on_resume` or `in_motion`.
+  !> The name may include the name of a side or species, as in `side.left.velocity`.
   pure function change_of(name) result(when)
     character(len=*), intent(in) :: name
     character(len=len(never)) :: when
@@ -38,7 +38,8 @@ contains
     end do
   end function change_of
 
-  !> Whether a group may occur several times in an input file. Groups of the same name are distinguished by their variable `name`.
+  !> True if a group may occur several times in an input file. Groups of the same name are then
+  !> distinguished by their variable `name`.
   elemental function is_repeated(group)
     character(len=*), intent(in) :: group
     logical :: is_repeated
@@ -46,7 +47,7 @@ contains
     is_repeated = any(wall_groups == group) .or. group == "species" .or. group == "source" .or. group == "change"
   end function is_repeated
 
-  !> Names of the variables of a group, in the order of the table.
+  !> Names of the variables in a group, in the order of the table.
   pure function variables_of(group) result(names)
     character(len=*), intent(in) :: group
     character(len=name_length), allocatable :: names(:)
@@ -54,7 +55,7 @@ contains
     names = pack(table%name, table%group == group)
   end function variables_of
 
-  !> Index of a variable in its group, in the order of `variables_of`; 0 if the group does not contain the variable.
+  !> Index of a variable in its group; 0 if the group does not contain the variable.
   pure function row_of(group, name) result(row)
     character(len=*), intent(in) :: group, name
     integer :: row
@@ -69,8 +70,8 @@ contains
     row = 0
   end function row_of
 
-  !> Full names of the variables with a given name in all groups, as in `obstacle.radius or species.radius`; empty if no group
-  !> contains such a variable.
+  !> Full names of all variables with a given name, such as `obstacle.radius or species.radius`;
+  !> empty if there are none.
   pure function full_names(name) result(text)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: text
@@ -84,8 +85,8 @@ contains
     end do
   end function full_names
 
-  !> Whether two variables of a group must not be given together. Two variables that set intervals for the same kind of samples also
-  !> exclude each other.
+  !> True if two variables of a group must not both be set. This includes two sampling intervals for
+  !> the same kind of samples.
   pure function excludes(one, other) result(yes)
     integer, intent(in) :: one, other        !! rows
     logical :: yes
@@ -94,7 +95,7 @@ contains
     if (other < one .and. track_of(table(one)%name) /= "") yes = track_of(table(one)%name) == track_of(table(other)%name)
   end function excludes
 
-  !> Names of the variables that must not be given together with a variable of the same group.
+  !> Variables of the same group that must not be set together with a variable.
   pure function excluded_by(row) result(names)
     integer, intent(in) :: row
     character(len=name_length), allocatable :: names(:)
@@ -112,8 +113,8 @@ contains
     sentence = help(:index(trim(help)//" ", ". "))
   end function first_sentence
 
-  !> Kind of samples for which a variable sets an interval, such as `frames` for frames_every_time. The result is empty if the
-  !> variable does not set an interval.
+  !> Kind of samples whose interval a variable sets, such as `frames` for frames_every_time; empty
+  !> for other variables.
   pure function track_of(name) result(track)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: track
@@ -131,7 +132,7 @@ contains
     if (size(words) > 0) read (line, *) words
   end function words_of
 
-  !> Text that states which values are allowed, as in `a number > 0` or `'wall' or 'periodic'`.
+  !> Description of the allowed values, such as `a number > 0` or `'wall' or 'periodic'`.
   pure function allowed(row) result(words)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: words
@@ -152,7 +153,7 @@ contains
     if (row%size > 1) words = written(row%size)//" "//words
   end function allowed
 
-  !> Joins words to a list of alternatives, as in `'a', 'b' or 'c'`.
+  !> Joins words to a list of alternatives such as `'a', 'b' or 'c'`.
   pure function either(words) result(text)
     character(len=*), intent(in) :: words(:)
     character(len=:), allocatable :: text
