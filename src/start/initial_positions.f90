@@ -1,13 +1,13 @@
-!> Determines the initial positions of all disks.
+!> Generates the initial positions of all disks.
 !>
-!> The order of placement is:
+!> The species are placed in the following order:
 !> 1. species with fixed positions ('explicit', 'file', 'grid' or 'lattice'), in the order of the
-!>   input;
-!> 2. 'random' species, those with the largest disks first;
-!> 3. 'dense' and 'grown' species; all of one region are compressed together, with the disks placed
-!>   earlier as fixed obstacles.
+!>    input;
+!> 2. 'random' species, in the order of decreasing disk size;
+!> 3. 'dense' and 'grown' species. All species of the same region are compressed together; disks
+!>    placed earlier act as fixed obstacles.
 !>
-!> If one species is 'relaxed', all must be, and their disks are placed together.
+!> If any species is 'relaxed', all must be; their disks are placed together.
 module initial_positions
   use kinds, only: int32, int64, real64
   use box_sides, only: centre_range
@@ -30,13 +30,14 @@ module initial_positions
   private
   public :: place_disks
 
-  integer, parameter :: most_reports = 5                    !! limit of the number of reported problems, for each kind and species
+  !> Maximum number of reported problems per kind and species.
+  integer, parameter :: most_reports = 5
 
-  !> The placement of all species of a simulation, while it is made.
+  !> State of the placement of all species of a simulation.
   type :: positions_t
-    type(packing_t) :: packing                              !! the disks that have been placed
+    type(packing_t) :: packing                              !! disks placed so far
     integer(int64) :: seed
-    !> .true. to leave out placements that move all disks, which are then at the centre of the box
+    !> .true. to skip placements that move all disks; these disks are put at the centre of the box.
     logical :: unrelaxed
     type(problem_list_t) :: problems
   contains
@@ -47,8 +48,8 @@ module initial_positions
 
 contains
 
-  !> Sets the positions and radii of all disks, and the velocities of disks that are read from a file with velocities. Waiting disks
-  !> are not placed; their position is the lower left corner of the box.
+  !> Sets the positions and radii of all disks, and the velocities of disks whose file contains
+  !> velocities. Waiting disks are put at the lower left corner of the box.
   subroutine place_disks(species, groups, seed, unrelaxed, line, sim, problems)
     type(species_settings_t), intent(inout) :: species(:)   !! as in `place_all`
     type(group_t), intent(in) :: groups(:)
@@ -57,8 +58,8 @@ contains
     class(status_line_t), intent(inout) :: line
     type(simulation_t), intent(inout) :: sim
     type(problem_list_t), intent(inout) :: problems
-    type(species_settings_t), allocatable :: placed(:)      ! the species without waiting disks
-    type(simulation_t) :: inside                            ! the simulation without waiting disks
+    type(species_settings_t), allocatable :: placed(:)      ! the species without their waiting disks
+    type(simulation_t) :: inside                            ! simulation without waiting disks
     integer :: s
 
     if (all(species%waiting == 0)) then
@@ -82,12 +83,12 @@ contains
     call sim%simplify_masses()
   end subroutine place_disks
 
-  !> Copies the placed disks of each species, and adds its waiting disks behind them.
+  !> Copies the placed disks of each species to the simulation, followed by its waiting disks.
   subroutine add_waiting(species, seed, placed, inside, sim)
     type(species_settings_t), intent(in) :: species(:)
     integer(int64), intent(in) :: seed
-    type(species_settings_t), intent(in) :: placed(:)       !! the species without waiting disks
-    type(simulation_t), intent(in) :: inside                !! the simulation without waiting disks
+    type(species_settings_t), intent(in) :: placed(:)       !! the species without their waiting disks
+    type(simulation_t), intent(in) :: inside                !! simulation without waiting disks
     type(simulation_t), intent(inout) :: sim
     integer :: s, k, n
 
@@ -108,15 +109,16 @@ contains
     end do
   end subroutine add_waiting
 
-  !> Sets the positions and radii of all disks, and the velocities of disks that are read from a file with velocities.
+  !> Sets the positions and radii of all disks, and the velocities of disks whose file contains
+  !> velocities.
   subroutine place_all(species, groups, seed, unrelaxed, line, sim, problems)
-    !> Settings of the species, whose tables of disks are deallocated.
+    !> Settings of the species; their tables of disks are deallocated.
     type(species_settings_t), intent(inout) :: species(:)
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
     integer(int64), intent(in) :: seed
     logical, intent(in) :: unrelaxed                        !! as in `positions_t`
-    class(status_line_t), intent(inout) :: line             !! status line that shows the progress of the placement
-    !> Simulation that contains its box, and the disks in the order of the input
+    class(status_line_t), intent(inout) :: line             !! status line for the progress of the placement
+    !> Simulation with its box, and with its disks in the order of the input.
     type(simulation_t), intent(inout) :: sim
     type(problem_list_t), intent(inout) :: problems
     type(positions_t) :: positions
@@ -135,14 +137,14 @@ contains
     end do
   end subroutine place_all
 
-  !> Places the species in the order stated at the beginning of this file, up to the first problem.
+  !> Places the species in the order given at the top of this file, until the first problem occurs.
   subroutine place_in_order(self, species, groups, line, sim)
     class(positions_t), intent(inout) :: self
     type(species_settings_t), intent(inout) :: species(:)
     type(group_t), intent(in) :: groups(:)
     class(status_line_t), intent(inout) :: line
     type(simulation_t), intent(inout) :: sim
-    integer :: turn(size(species))                          ! turn of each species; 0 if it has been placed or has no disks
+    integer :: turn(size(species))      ! stage of each species; 0 if placed or without disks
     integer :: s, k
 
     turn = [(species(k)%placement%turn(), k=1, size(species))]
@@ -165,7 +167,7 @@ contains
     end do
   end subroutine place_in_order
 
-  !> Whether each species has the same region and placement as species s.
+  !> True for each species with the same region and placement as species s.
   pure function alike(species, s) result(yes)
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
@@ -215,8 +217,8 @@ contains
     end do
   end subroutine place_batch
 
-  !> Collects the radii of the disks of some species and, if there is an initial-configuration file, their
-  !> positions, which are checked.
+  !> Collects the radii of the disks of several species. If the species have an
+  !> initial-configuration file, its positions are checked and collected as well.
   subroutine load_batch(self, members, species, groups, sim, batch)
     class(positions_t), intent(inout) :: self
     integer, intent(in) :: members(:)
@@ -224,7 +226,8 @@ contains
     type(group_t), intent(in) :: groups(:)
     type(simulation_t), intent(inout) :: sim
     type(batch_t), intent(inout) :: batch
-    type(packing_t) :: small                                ! copy of the packing, with small disks at the positions from files
+    ! the packing, plus shrunk disks at the positions from files
+    type(packing_t) :: small
     integer :: before, first, last, k
     real(real64) :: scale
 
@@ -258,8 +261,8 @@ contains
     end do
   end subroutine load_batch
 
-  !> Copies masses, orientations and, if requested, velocities of a species from its initial-configuration file to
-  !> the simulation.
+  !> Copies masses, orientations and, if requested, velocities of a species from its
+  !> initial-configuration file to the simulation.
   subroutine take_from_file(species, s, group, sim, problems)
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s                                !! index of the species
@@ -286,19 +289,19 @@ contains
     end associate
   end subroutine take_from_file
 
-  !> Adds a species with known positions to the packing, and reports disks that overlap other disks
-  !> or are not completely inside their region.
+  !> Adds a species with known positions to the packing. Disks that overlap other disks, or are not
+  !> completely inside their region, are reported.
   subroutine add_species(packing, species, s, group, x, radius, problems)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
     type(group_t), intent(in) :: group
-    real(real64), intent(in) :: x(:, :)                     !! (2,count) [length]
-    real(real64), intent(in) :: radius(:)                   !! (count) [length]
+    real(real64), intent(in) :: x(:, :)                     !! shape (2, count) [length]
+    real(real64), intent(in) :: radius(:)                   !! shape (count) [length]
     type(problem_list_t), intent(inout) :: problems
     real(real64) :: lower(2), upper(2), slack
     integer(int32) :: k, blocker
-    integer :: outside, overlapping                         ! numbers of disks outside the region, and of overlapping disks
+    integer :: outside, overlapping      ! numbers of disks outside the region and of overlapping disks
     character(len=:), allocatable :: taken
 
     outside = 0
@@ -329,7 +332,7 @@ contains
     end associate
   end subroutine add_species
 
-  !> Reports a problem of disk k of a species.
+  !> Reports a problem with disk k of a species.
   subroutine report_disk(me, k, x, what, group, problems)
     type(species_settings_t), intent(in) :: me
     integer(int32), intent(in) :: k
@@ -345,11 +348,11 @@ contains
       //" "//what, problems)
   end subroutine report_disk
 
-  !> Predicate of a message about a disk that conflicts with another disk or with an obstacle.
+  !> Predicate of a message about a disk that overlaps another disk or an obstacle.
   function conflict(packing, species, blocker) result(text)
     type(packing_t), intent(in) :: packing
     type(species_settings_t), intent(in) :: species(:)
-    integer(int32), intent(in) :: blocker                   !! index of the other disk (> 0), or code of the obstacle
+    integer(int32), intent(in) :: blocker      !! index of the other disk (> 0), or id of the obstacle
     character(len=:), allocatable :: text
 
     if (blocker > 0) then

@@ -1,4 +1,5 @@
-!> Creates the simulation that an input describes, with all disks at their initial positions and with their initial velocities.
+!> Creates the simulation described by an input, with the initial positions and velocities of all
+!> disks.
 module initial_state
   use kinds, only: int32, real64
   use disks, only: disks_before
@@ -15,19 +16,21 @@ module initial_state
   private
   public :: check_speeds, create_simulation, describe_system
 
-  !> Largest magnitude of a number that the program squares; double precision ends at about 1e308.
+  !> Maximum magnitude of a number that is squared; double precision ends at about 1e308.
   real(real64), parameter :: most = 1.0e130_real64
-  real(real64), parameter :: widest = 1.0e30_real64*(1 + 1.0e-12_real64)   !! largest ratio of two masses
+  real(real64), parameter :: widest = 1.0e30_real64*(1 + 1.0e-12_real64)   !! maximum ratio of two masses
 
 contains
 
-  !> Creates the simulation described by the input, and deallocates the tables of disks read from files.
+  !> Creates the simulation described by the input. The tables of disks read from files are
+  !> deallocated.
   subroutine create_simulation(input, line, sim, error, unrelaxed)
     type(run_input_t), intent(inout) :: input
-    class(status_line_t), intent(inout) :: line             !! status line that shows the progress of the placement
+    class(status_line_t), intent(inout) :: line             !! status line for the progress of the placement
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
-    !> .true. to skip the placement of 'relaxed' species; a mere check of the input (--check) needs no positions
+    !> .true. to skip the placement of 'relaxed' species; a mere check of the input (--check) needs
+    !> no positions.
     logical, intent(in), optional :: unrelaxed
     type(problem_list_t) :: problems
     logical :: without_placement
@@ -50,10 +53,11 @@ contains
     call problems%report(input%path, error, input%overrides)
   end subroutine create_simulation
 
-  !> Marks the last disks of each species that wait outside of the box at the start.
+  !> Marks the disks that wait outside the box at the start: the last disks of each species.
   pure subroutine let_wait(species, sim)
     type(species_settings_t), intent(in) :: species(:)
-    type(simulation_t), intent(inout) :: sim                !! simulation with its disks in the order of the input
+    !> Simulation with its disks in the order of the input.
+    type(simulation_t), intent(inout) :: sim
     integer :: s
 
     if (.not. allocated(sim%waits)) return
@@ -65,8 +69,8 @@ contains
     end do
   end subroutine let_wait
 
-  !> Reports an error if products of lengths, speeds and masses in the prediction or execution of collisions could overflow or
-  !> underflow, which would make the simulation miss collisions.
+  !> Reports an error if products of lengths, speeds and masses could overflow or underflow in the
+  !> prediction or execution of collisions. The simulation would then miss collisions.
   subroutine check_speeds(sim, problems)
     type(simulation_t), intent(in) :: sim
     type(problem_list_t), intent(inout) :: problems
@@ -95,7 +99,8 @@ contains
     end if
   end subroutine check_speeds
 
-  !> Sets the box, the contact law, the species and all other components of a simulation except the disks.
+  !> Sets all components of a simulation except the disks: the box, the contact law, the species,
+  !> and others.
   subroutine describe_system(settings, sim)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(inout) :: sim

@@ -1,5 +1,6 @@
-!> Checks the geometry of the system: obstacles and regions must lie inside the box, and the disks must fit into their regions. Each
-!> problem is reported with the line of the input file that causes it.
+!> Checks the geometry of the system: the obstacles and regions must lie inside the box, and the
+!> disks must fit into their regions. Each problem is reported with the responsible line of the
+!> input file.
 module input_fit
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t
@@ -25,28 +26,31 @@ module input_fit
   private
   public :: check_fit, report_file_problem, complete_settings
 
-  real(real64), parameter, public :: rounding = 1.0e-12_real64        !! relative tolerance for disks that touch
-  real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! packing fraction of the triangular lattice
-  !> Ratio of the smallest to the largest radius above which disks of different sizes cannot be
-  !> packed more densely than equal disks (Blind, 1969, see `densest_packing`)
+  !> Relative tolerance for touching disks.
+  real(real64), parameter, public :: rounding = 1.0e-12_real64
+  !> Packing fraction of the triangular lattice.
+  real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)
+  !> Ratio of the smallest to the largest radius above which the densest packing of unequal disks is
+  !> no denser than that of equal disks (Blind, 1969, see `densest_packing`).
   real(real64), parameter :: nearly_equal = 0.743_real64
 
-  !> Area and range of radii of the disks of a species.
+  !> Total area and range of radii of the disks of a species.
   type :: extent_t
-    real(real64) :: area = 0.0_real64                         !! sum over all disks [length**2]
+    real(real64) :: area = 0.0_real64                         !! total area [length**2]
     real(real64) :: smallest = 0.0_real64, largest = 0.0_real64   !! radii [length]
   end type extent_t
 
 contains
 
-  !> Completes the settings with the contents of initial-configuration files and the random radii, and determines the features of
-  !> the run.
+  !> Completes the settings by reading initial-configuration files and drawing random radii, and
+  !> determines the features of the run.
   subroutine complete_settings(settings, groups, problems, complete)
     type(settings_t), intent(inout) :: settings
     type(group_t), intent(inout) :: groups(:)
-    !> Problems of the input; the procedure adds unreadable files and insufficient memory.
+    !> Problems of the input. Unreadable files and insufficient memory are added to the list.
     type(problem_list_t), intent(inout) :: problems
-    logical, intent(out) :: complete                          !! .false. if the number of disks is too large or the box is invalid
+    !> .false. if the box is invalid or the number of disks is too large.
+    logical, intent(out) :: complete
     integer :: s(2), k, before
 
     complete = .false.
@@ -57,7 +61,7 @@ contains
     end do
     call settings%choose_features()
     call check_columns(settings, groups(place_of("output", groups%name)), problems)
-    if (settings%n_disks() > most_disks) return               ! an excessive number of disks is reported elsewhere
+    if (settings%n_disks() > most_disks) return               ! reported elsewhere
     before = problems%count
     call check_memory(settings, problems)
     if (problems%count > before) return
@@ -67,8 +71,9 @@ contains
     complete = .true.
   end subroutine complete_settings
 
-  !> Reports requested columns of frames that the run does not have, such as orientations of disks that do not rotate. The check
-  !> follows the reading of initial-configuration files, because their contents can determine whether disks rotate.
+  !> Reports requested frame columns that do not exist in this run, such as orientations of disks
+  !> that do not rotate. Initial-configuration files must have been read before, because their
+  !> contents can determine whether disks rotate.
   subroutine check_columns(settings, group, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: group                        !! the group `output`
@@ -91,15 +96,15 @@ contains
     end associate
   end subroutine check_columns
 
-  !> Checks whether the obstacles fit into the box, and the disks of each species into their region. Species with an invalid number
-  !> or size of disks are skipped, because this has been reported before.
+  !> Checks that the obstacles fit into the box, and the disks of each species into their region.
+  !> Species whose number or size of disks is invalid, which has been reported, are skipped.
   subroutine check_fit(settings, groups, problems, running)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
-    !> whether the disks are already moving, so that their initial state is not checked
+    !> .true. if the disks are already moving; their initial state is then not checked.
     logical, intent(in) :: running
-    character(len=:), allocatable :: misfit                   ! name of the variable, a colon, and the problem
+    character(len=:), allocatable :: misfit                   ! "variable: problem"
     real(real64) :: beyond(2, 2)
     type(extent_t) :: extent(size(settings%species))
     type(group_fields_t) :: fields
@@ -108,8 +113,8 @@ contains
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
     associate (box => settings%box, species => settings%species)
-      beyond = box%side_excursion()                           ! distance by which moving sides extend beyond the box
-      do k = 1, box%n_obstacles()                             ! the function `misfit` of a shape checks the position of an obstacle
+      beyond = box%side_excursion()      ! distance that moving sides extend beyond the box
+      do k = 1, box%n_obstacles()                             ! each shape checks its position by `misfit`
         misfit = box%obstacle(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
         if (misfit /= "") call report_obstacle_problem(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
           problems)
@@ -137,7 +142,7 @@ contains
     end associate
   end subroutine check_fit
 
-  !> Area and range of radii of the disks of the k-th species that are in the box at the start.
+  !> Total area and range of radii of the disks of species k that are in the box at the start.
   pure function extent_of(species, k, seed) result(extent)
     type(species_settings_t), intent(in) :: species
     integer, intent(in) :: k
@@ -156,12 +161,12 @@ contains
     if (allocated(radius)) extent = extent_t(pi*sum(radius**2), minval(radius), maxval(radius))
   end function extent_of
 
-  !> Reports a region whose packing fraction, including all species placed within it, would exceed a
-  !> proven upper bound. No method could place these disks, and some would try for a long time.
-  !> Given positions are not bound to a region.
+  !> Reports a region whose packing fraction, including all species placed in it, would exceed a
+  !> proven upper bound. No method could place these disks, and some methods would try for a long
+  !> time. Given positions are not bound to a region.
   pure subroutine check_packing(species, extent, groups, problems)
     type(species_settings_t), intent(in) :: species(:)
-    type(extent_t), intent(in) :: extent(:)                   !! areas and radii of the disks of each species
+    type(extent_t), intent(in) :: extent(:)                   !! extent of each species
     type(group_t), intent(in) :: groups(:)                    !! groups of the species
     type(problem_list_t), intent(inout) :: problems
     real(real64) :: packing, smallest, largest, most
@@ -185,7 +190,7 @@ contains
     end do
   end subroutine check_packing
 
-  !> Reports a container whose area is smaller than that of all disks.
+  !> Reports a container whose area is smaller than the total area of the disks.
   pure subroutine check_containers(box, area, group, problems)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: area                          !! total area of the disks [length**2]
@@ -203,33 +208,33 @@ contains
     end do
   end subroutine check_containers
 
-  !> Upper bound of the packing fraction of disks in the plane. The bound also holds for a rectangular
-  !> box, with walls or periodic: copies of the box fill the plane at the packing fraction of the box.
-  !> For nearly equal radii the bound is the packing fraction of the triangular lattice (Blind,
-  !> Journal für die reine und angewandte Mathematik 236, 145, 1969). For other radii, let one disk of
-  !> the largest and two of the smallest radius touch each other: the bound is the packing fraction
-  !> inside the triangle of their centres (Florian, Rendiconti del Circolo Matematico di Palermo 9,
-  !> 300, 1960). Fernique (2021, arXiv:2107.14079) reviews both results.
+  !> Upper bound of the packing fraction of disks in the plane. The bound also holds for a
+  !> rectangular box, walled or periodic, because copies of the box fill the plane at the same
+  !> packing fraction. For nearly equal radii it is the packing fraction of the triangular lattice
+  !> (Blind, Journal für die reine und angewandte Mathematik 236, 145, 1969). For other radii, let a
+  !> disk of the largest radius and two of the smallest touch each other: the bound is the packing
+  !> fraction in the triangle of their centres (Florian, Rendiconti del Circolo Matematico di
+  !> Palermo 9, 300, 1960). Both results are reviewed by Fernique (2021, arXiv:2107.14079).
   pure function densest_packing(ratio) result(most)
-    real(real64), intent(in) :: ratio                         !! smallest radius divided by largest radius
+    real(real64), intent(in) :: ratio                         !! smallest radius divided by the largest
     real(real64) :: most
 
     most = closest_packing
     if (ratio < nearly_equal) most = (pi*ratio**2 + 2*(1 - ratio**2)*asin(ratio/(1 + ratio)))/(2*ratio*sqrt(1 + 2*ratio))
   end function densest_packing
 
-  !> Reports an invalid position of an obstacle, with its line in a file or the number of the point
-  !> in its polyline.
+  !> Reports an invalid position of an obstacle, with its line in a file or its point number in a
+  !> polyline.
   subroutine report_obstacle_problem(box, m, group, misfit, problems)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: m                           !! index of the obstacle
     type(group_t), intent(in) :: group
-    character(len=*), intent(in) :: misfit                    !! name of the variable, a colon, and the problem
+    character(len=*), intent(in) :: misfit                    !! "variable: problem"
     type(problem_list_t), intent(inout) :: problems
     integer :: colon, number
 
     colon = index(misfit, ": ")
-    number = count(box%obstacle(:m)%surface == box%obstacle(m)%surface)          ! index of the obstacle in its group
+    number = count(box%obstacle(:m)%surface == box%obstacle(m)%surface)   ! index of the obstacle in its group
     if (has_many(group) .and. .not. any(group%values%name == "points" .and. group%values%given)) then
       call group%complain("file", origin_of_row(group%text_of("file"), number)//": "//misfit, problems)
     else if (has_many(group)) then
@@ -240,8 +245,9 @@ contains
     end if
   end subroutine report_obstacle_problem
 
-  !> Reports sides that would crush the disks, because their motion would leave a box smaller than the total area of the disks.
-  !> Boxes with a piston are not checked: the disks can push it outwards.
+  !> Reports sides that would crush the disks, because their motion makes the box smaller than the
+  !> total area of the disks. Boxes with a piston are not checked, because the disks can push it
+  !> outwards.
   subroutine check_strokes(box, disks, groups, problems)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: disks                         !! total area of the disks [length**2]
@@ -271,9 +277,10 @@ contains
     end do
   end subroutine check_strokes
 
-  !> Determines whether the disks of a species rotate, and reads their number and radii from an initial-configuration file unless
-  !> the input contains both. In this case an unreadable file is not reported here, but only when the disks are placed, because a
-  !> resumed run places no disks and does not need the file.
+  !> Determines whether the disks of a species rotate, and reads the number and radii of the disks
+  !> from an initial-configuration file unless the input contains both. If it does, an unreadable
+  !> file is not reported before the disks are placed, because a resumed run places no disks and
+  !> does not need the file.
   subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: k                                  !! index of the species
@@ -307,7 +314,8 @@ contains
     end associate
   end subroutine read_missing_values
 
-  !> Determines the largest radius that the run will draw, and the packing fraction of the drawn disks.
+  !> Determines the maximum of the random radii of the run, and the packing fraction of disks with
+  !> these radii.
   subroutine measure_radii(s, k, seed, group)
     type(species_settings_t), intent(inout) :: s
     integer, intent(in) :: k                                  !! index of the species
@@ -332,13 +340,13 @@ contains
     if (s%in_file%error%code == exit_files) problems%unreadable = problems%unreadable + 1
   end subroutine report_file_problem
 
-  !> Checks that a disk of a species fits into its region, into each period of the box, and into every obstacle that encloses the
-  !> disks.
+  !> Checks that a disk of a species fits into its region, into each period of the box, and into
+  !> every obstacle that encloses the disks.
   subroutine check_species(group, s, box, alone, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(box_t), intent(in) :: box
-    !> .true. if the run has only one disk, which belongs to this species
+    !> .true. if this species consists of the only disk of the run.
     logical, intent(in) :: alone
     type(problem_list_t), intent(inout) :: problems
     logical :: sound
@@ -359,8 +367,8 @@ contains
 
   contains
 
-    !> Checks one axis: the region must lie in the box and be wide enough for a disk. A period must exceed two diameters, so that no
-    !> disk can touch two images of another disk at the same time.
+    !> Checks one axis. The region must lie in the box and be wide enough for a disk. A period must
+    !> exceed two diameters, so that a disk cannot touch two images of another disk simultaneously.
     subroutine check_axis()
       logical :: endless(2)
       real(real64) :: lower, upper, room, farthest, least, low(2), high(2)
@@ -370,7 +378,7 @@ contains
       endless = spans(s%region, box)
       lower = s%region(2*axis - 1)
       upper = s%region(2*axis)
-      room = min(upper, high(axis)) - max(lower, low(axis))   ! width of the region between the displaced sides
+      room = min(upper, high(axis)) - max(lower, low(axis))  ! width of the region between the displaced sides
       farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
       least = merge(2*s%radius, 4*s%radius + rounding*farthest, alone)
       if (lower >= upper) then

@@ -1,4 +1,4 @@
-!> Reads disks from the last complete frame in the output of a finished or unfinished run.
+!> Reads disks from the last complete frame in the output of a run, finished or unfinished.
 submodule(starting_disks) last_frame
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use h5md_layout, only: box_group, disk_species, frame_counter, presence, species_names, value_of
@@ -64,7 +64,7 @@ contains
 
   contains
 
-    !> Reports disks that waited outside of the box in the last frame, where their positions are NaN.
+    !> Reports disks that were outside the box in the last frame, where their positions are NaN.
     subroutine check_presence()
       integer, allocatable :: absent(:)
 
@@ -75,8 +75,8 @@ contains
         //""" are not in the box, the first of them disk "//written(absent(1))//"; a start needs all disks of the species")
     end subroutine check_presence
 
-    !> Reads a range of rows of the table for all disks. Constant quantities, such as radii and masses, are read from datasets
-    !> outside the frames.
+    !> Reads a range of rows of the table for all disks. Constant quantities such as radii and
+    !> masses are stored in datasets outside the frames.
     subroutine read_rows(first, last)
       integer, intent(in) :: first, last
       type(series_t) :: series

@@ -1,4 +1,5 @@
-!> Reports that output files of runs cannot be read. This submodule is part of libricochet.so, the library without HDF5.
+!> Reports that output files of runs cannot be read. This submodule is part of libricochet.so, the
+!> library without HDF5.
 submodule(starting_disks) last_frame_without_hdf5
   implicit none
 

@@ -1,6 +1,7 @@
-!> Checks whether a run fits into the memory that is available on the machine or granted by a batch system; otherwise it is refused
-!> before it starts. If memory suffices only without domains, the run uses the serial engine. The available memory is known only on
-!> Linux; on other systems every run is accepted.
+!> Checks that a run fits into the free memory of the computer, or into the memory granted by a
+!> batch system; otherwise the run is refused before it starts. If memory suffices only without
+!> domains, the run uses the serial engine. The free memory is known only on Linux; on other systems
+!> every run is accepted.
 module memory
   use kinds, only: int64, never, pi, real64
   use input_problems, only: problem_list_t
@@ -14,26 +15,26 @@ module memory
   private
   public :: check_memory, free_memory, memory_needed, peak, room_for_domains
 
-  !> Memory in bytes per disk, per obstacle and per process: contributions to the peak of the resident memory, in agreement with
-  !> measurements by `runs/memory.sh` within 5 %. For time-stepped dynamics they are upper bounds, because the length of the Verlet
-  !> lists depends on the time step.
+  !> Contributions to the peak of the resident memory, in bytes per disk, per obstacle and per
+  !> process; they agree with measurements by `runs/memory.sh` within 5 %. For time-stepped dynamics
+  !> they are upper bounds, because the length of the Verlet lists depends on the time step.
   integer(int64), parameter :: per_process = 10000000, per_obstacle = 580
-  !> Memory of the state and the next event of a disk (`record`), and of a cell of the neighbour search (`cell`)
+  !> State and next event of a disk (`record`); cell of the neighbour search (`cell`).
   real(real64), parameter :: record = 103, cell = 32
-  !> Memory of the image indices, contact time and rotation of a disk (`extra`), and of an individual mass (`own_size`)
+  !> Image counters, contact time and rotation of a disk (`extra`); individual mass (`own_size`).
   real(real64), parameter :: extra = 40, own_size = 8
-  real(real64), parameter :: watched = 40                    !! memory for the series of simultaneous collisions of a disk
-  real(real64), parameter :: sampled = 8.8_real64            !! memory for each value of a disk in a frame
+  !> Series of simultaneous collisions of a disk.
+  real(real64), parameter :: watched = 40
+  real(real64), parameter :: sampled = 8.8_real64            !! one value of a disk in a frame
   real(real64), parameter :: listed = 264                    !! neighbour list of a disk
-  !> Memory per disk of the random numbers of kicks (`kicked`), of the test for free positions of kicks that move disks
-  !> (`placed_anew`), and of the Verlet lists of time-stepped dynamics (`stepped`)
+  !> Random numbers of kicks (`kicked`), test for free positions in kicks that move disks
+  !> (`placed_anew`), and Verlet lists of time-stepped dynamics (`stepped`), per disk.
   real(real64), parameter :: kicked = 24, placed_anew = 70, stepped = 100
-  !> Additional memory per disk if the box is divided into domains, with walls (first number) and
-  !> periodic (second number)
+  !> Additional memory per disk with domains, for walled (first) and periodic (second) boxes.
   real(real64), parameter :: divided(2) = [152, 212]
-  !> Additional memory per disk if a run uses both domains and neighbour lists
+  !> Additional memory per disk with both domains and neighbour lists.
   real(real64), parameter :: listed_twice = 80
-  !> Upper bound of the number of cells per disk that `cell_layout` chooses
+  !> Upper bound of the number of cells per disk chosen by `cell_layout`.
   real(real64), parameter :: cells_per_disk = 1.67_real64
 
 contains
@@ -53,8 +54,8 @@ contains
       //size_text(needed)//" of memory, and "//size_text(free)//" are free; use fewer disks")
   end subroutine check_memory
 
-  !> Whether memory suffices to divide the box into domains. The safety margin is needed because the operating system kills a run
-  !> without warning when memory is exhausted.
+  !> True if the memory suffices for domains. A safety margin is needed, because the operating
+  !> system kills a run without warning when the memory is exhausted.
   function room_for_domains(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
@@ -62,7 +63,7 @@ contains
     yes = 1.15_real64*real(peak(settings, domains=.true.), real64) <= real(free_memory(""), real64)
   end function room_for_domains
 
-  !> Memory that a run needs, including the domains if the run will use domains. [bytes]
+  !> Memory required by a run in bytes, including its domains if it uses domains.
   function memory_needed(settings) result(bytes)
     type(settings_t), intent(in) :: settings
     integer(int64) :: bytes
@@ -73,12 +74,12 @@ contains
     bytes = peak(settings, domains)
   end function memory_needed
 
-  !> Peak memory of a run, with or without domains. [bytes]
+  !> Peak memory of a run in bytes, with or without domains.
   pure function peak(settings, domains) result(bytes)
     type(settings_t), intent(in) :: settings
     logical, intent(in) :: domains                        !! .true. if the box is divided into domains
     integer(int64) :: bytes
-    real(real64) :: running, starting, more               ! bytes per disk
+    real(real64) :: running, starting, more               ! [bytes per disk]
     logical :: lists
     integer :: k
 
@@ -114,7 +115,7 @@ contains
     end associate
   end function numbers_in_frame
 
-  !> Number of cells in the grid of the search, divided by the number of disks.
+  !> Number of cells in the search grid, divided by the number of disks.
   pure function cells(settings) result(n)
     type(settings_t), intent(in) :: settings
     real(real64) :: n
@@ -124,7 +125,7 @@ contains
     n = min(cells_per_disk, 0.25_real64*pi/max(crowding(settings), tiny(n)))
   end function cells
 
-  !> Whether the run will use neighbour lists, according to the condition in `neighbour_lists`.
+  !> True if the run uses neighbour lists, according to the condition in `neighbour_lists`.
   pure function are_listed(settings) result(yes)
     type(settings_t), intent(in) :: settings
     logical :: yes
@@ -139,8 +140,8 @@ contains
     yes = candidates > candidates_that_pay - 27*packing
   end function are_listed
 
-  !> Packing fraction that the system would have if all disks had the radius that determines the width of the cells: the largest
-  !> radius of all species with at least a twentieth of the disks.
+  !> Hypothetical packing fraction if all disks had the radius that determines the cell width: the
+  !> largest radius of all species with at least a twentieth of the disks.
   pure function crowding(settings) result(fraction)
     type(settings_t), intent(in) :: settings
     real(real64) :: fraction, radius
@@ -154,13 +155,15 @@ contains
     fraction = settings%n_disks()*pi*radius**2/product(settings%box%edges())
   end function crowding
 
-  !> Available memory: the smaller of the free memory of the computer and the limit of the process's control group, beyond which the
-  !> operating system kills a batch job without a message. Huge if neither is known. [bytes]
+  !> Available memory in bytes: the smaller of the free memory of the computer and the limit of the
+  !> control group, beyond which the operating system kills a batch job without a message. The
+  !> result is huge if neither is known.
   function free_memory(root) result(bytes)
-    character(len=*), intent(in) :: root                  !! root folder of the file system; empty except in tests
+    !> Root folder of the file system; empty except in tests.
+    character(len=*), intent(in) :: root
     integer(int64) :: bytes
-    ! A line of the form `number:controllers:group`; in version 2 of control groups the controllers
-    ! are empty
+    ! A line of the form `number:controllers:group`; in version 2 of control groups the list of
+    ! controllers is empty
     character(len=:), allocatable :: groups, line
     character(len=:), allocatable :: folder, unread
     integer :: top, at, colon
@@ -178,15 +181,15 @@ contains
       top = len(folder)
       if (index(line(:colon), "memory") + index(line, "::") == 0) cycle
       folder = folder//line(colon + 1:)
-      do while (len(folder) >= top)                       ! the control group, and all control groups that contain it
+      do while (len(folder) >= top)                       ! the control group and all groups that contain it
         bytes = min(bytes, number_after("", folder//"/memory.max"), number_after("", folder//"/memory.limit_in_bytes"))
         folder = folder(:index(folder, "/", back=.true.) - 1)
       end do
     end do
   end function free_memory
 
-  !> Number after a label at the beginning of a line of a file; huge if no line begins with the
-  !> label.
+  !> Number that follows a label at the start of a line of a file; a huge number if there is no such
+  !> line.
   function number_after(label, path) result(number)
     character(len=*), intent(in) :: label, path
     integer(int64) :: number

@@ -1,5 +1,5 @@
-!> Checks the positions of disks that a user has moved in a running simulation, by the same rules as
-!> the initial positions of a run.
+!> Checks the positions of disks moved by the user in a running simulation, by the same rules as the
+!> initial positions of a run.
 module moved_disks
   use box_sides, only: bounds
   use errors, only: error_t, exit_usage, fail
@@ -15,14 +15,16 @@ module moved_disks
 
 contains
 
-  !> Reports the first disk, in the order of the input, that overlaps another disk, an obstacle or a side at the present time.
+  !> Reports the first disk, in the order of the input, that overlaps another disk, an obstacle or a
+  !> side at the present time.
   subroutine check_positions(sim, error)
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
     type(packing_t) :: packing
     real(real64) :: x(2, size(sim%disk)), radius(size(sim%disk)), lower(2), upper(2), inset(2, 2), slack
     integer(int32) :: id(size(sim%disk)), species(size(sim%disk)), i, blocker
-    logical :: passed(2, 2)                                   ! whether a side is periodic or open: (axis, lower or upper side)
+    ! whether a side is periodic or open; indices: axis, lower or upper side
+    logical :: passed(2, 2)
 
     id = sim%tag%id
     species(id) = sim%tag%species
@@ -34,7 +36,7 @@ contains
     passed = transpose(reshape(sim%box%open, [2, 2])) .or. spread(sim%box%periodic, 2, 2)
     packing = packing_t(sim%box, int(sim%n_disks()), size(sim%species))
     call packing%open_all_species(int(species), radius, minval(x, dim=2), maxval(x, dim=2))
-    do i = 1, sim%n_disks()                                   ! the i-th disk in the order of the input
+    do i = 1, sim%n_disks()                                   ! disk i in the order of the input
       if (allocated(sim%waits)) then
         if (sim%waits(i)) cycle
       end if
@@ -54,7 +56,7 @@ contains
     end do
   contains
 
-    !> Reports a problem of the disk with the id k.
+    !> Reports a problem with the disk of id k.
     subroutine complain(k, what)
       integer(int32), intent(in) :: k
       character(len=*), intent(in) :: what

@@ -1,5 +1,6 @@
-!> Reads disks from a text file with one line `x y` or `x y vx vy` per disk, or with the columns named in its first line, in lower
-!> or upper case. Empty lines are ignored, as is text from a # to the end of its line.
+!> Reads disks from a text file with one line `x y` or `x y vx vy` per disk, or with columns named
+!> in the first line, in lower or upper case. Empty lines are ignored, and so is text from a # to
+!> the end of its line.
 module position_file
   use kinds, only: int64, real64
   use input_words, only: read_real
@@ -10,7 +11,7 @@ module position_file
   private
   public :: angle_row, column_names, mass_row, radius_row, read_positions, spin_row
 
-  !> Names of the columns of a file of disks. Row k of the table of disks contains the quantity
+  !> Column names of a file of disks. Row k of the table of disks contains the quantity
   !> `column_names(k)`. Radius and mass are last, so that a single loop can check both.
   character(len=*), parameter :: column_names(*) = [character(len=7) :: "x", "y", "vx", "vy", "omega", "angle", "radius", "mass"]
   integer, parameter :: spin_row = 5, angle_row = 6, radius_row = 7, mass_row = 8
@@ -18,9 +19,10 @@ module position_file
   integer, parameter :: species_column = size(known_names)
   character(len=*), parameter :: numpy_mark = char(147)//"NUMPY", zip_mark = "PK"//achar(3)//achar(4)
 
-  !> A file of disks while it is read.
+  !> A file of disks being read.
   type, extends(text_table_t) :: positions_t
-    integer, allocatable :: column(:)  !! index in `known_names` of each column; empty before the first line has been read
+    !> Index in `known_names` of each column; empty before the first line is read.
+    integer, allocatable :: column(:)
   contains
     procedure :: read_disk
     procedure :: has_names
@@ -29,7 +31,7 @@ module position_file
 
 contains
 
-  !> Reads the disks of one species, or all disks of a file without a column for the species.
+  !> Reads the disks of one species, or all disks if the file has no column for the species.
   subroutine read_positions(path, names, s, disks)
     character(len=*), intent(in) :: path
     character(len=*), intent(in) :: names(:)                !! names of all species
@@ -61,8 +63,8 @@ contains
     call move_alloc(file%lines, disks%rows)
   end subroutine read_positions
 
-  !> Reads the line of a disk, and appends the disk if it belongs to species s. If the first line contains numbers, the columns are
-  !> x y or x y vx vy.
+  !> Reads the line of a disk, and stores the disk if it belongs to species s. If the first line
+  !> contains numbers, the columns are x y or x y vx vy.
   subroutine read_disk(self, names, s)
     class(positions_t), intent(inout) :: self
     character(len=*), intent(in) :: names(:)                !! names of all species
@@ -92,7 +94,7 @@ contains
     if (self%problem == "" .and. its_species == s) call self%append(value)
   end subroutine read_disk
 
-  !> Whether the line contains names of columns: at least one word is a known name, or no word is a
+  !> True if the line contains column names: at least one word is a known name, or no word is a
   !> number.
   function has_names(self) result(yes)
     class(positions_t), intent(in) :: self
@@ -112,7 +114,7 @@ contains
     yes = .not. some_number
   end function has_names
 
-  !> Reads the names of the columns.
+  !> Reads the column names.
   subroutine read_names(self)
     class(positions_t), intent(inout) :: self
     character(len=:), allocatable :: word, unknown, advice
@@ -141,7 +143,7 @@ contains
     end if
   end subroutine read_names
 
-  !> Index of the species whose name or number is the given word; 0 if no species has this name or number.
+  !> Index of the species with the given name or number; 0 if there is none.
   function species_named(word, names) result(s)
     character(len=*), intent(in) :: word, names(:)
     integer :: s

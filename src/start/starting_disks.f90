@@ -1,5 +1,6 @@
-!> Reads the disks of one species from an initial-configuration file in any of the supported formats. All numbers of the file are
-!> checked; quantities missing from the file are taken from the input.
+!> Reads the disks of one species from an initial-configuration file in any of the supported
+!> formats. All numbers in the file are checked; quantities missing from the file are taken from the
+!> input.
 module starting_disks
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: int64, real64
@@ -15,28 +16,29 @@ module starting_disks
   private
   public :: origin, read_disks, resolution
 
-  real(real64), parameter :: resolution = 1.0e-10_real64      !! smallest ratio of a radius to the largest coordinate
-  !> Datasets in the output file of a run, in the order of the quantities in `position_file: column_names`. Radius and mass are
-  !> constant; all other datasets are parts of the frames.
+  !> Minimum ratio of a radius to the largest coordinate.
+  real(real64), parameter :: resolution = 1.0e-10_real64
+  !> Datasets in the output of a run, in the order of `position_file: column_names`. Radius and mass
+  !> are constant; all other quantities are read from the frames.
   character(len=48), parameter :: datasets(*) = [character(len=48) :: position//value_of, position//value_of, &
     velocity//value_of, velocity//value_of, angular_velocity//value_of, orientation//value_of, disk_radius, disk_mass]
 
   interface
-    !> Reads the disks of one species from the last frame of a run. Of the two submodules,
-    !> `last_frame` does so, and `last_frame_without_hdf5` only reports that HDF5 files cannot be
-    !> read; the linker selects one of them.
+    !> Reads the disks of one species from the last frame of a run. There are two implementations,
+    !> of which the linker selects one: `last_frame` reads the file; `last_frame_without_hdf5`
+    !> reports that HDF5 files cannot be read.
     module subroutine read_last_frame(path, name, disks, box)
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: name                    !! name of the species
       type(disks_in_file_t), intent(inout) :: disks
-      !> Box to which the positions are scaled; without it, they are not scaled.
+      !> Box to which the positions are scaled; default: positions are not scaled.
       type(box_t), intent(in), optional :: box
     end subroutine read_last_frame
   end interface
 
 contains
 
-  !> Whether a path has the name of a finished or unfinished output of a run.
+  !> True if the path is that of a finished or unfinished output of a run.
   pure function is_run(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
@@ -75,8 +77,7 @@ contains
     end associate
   end subroutine read_disks
 
-  !> Records why the disks in the file cannot be used, unless an earlier reason has already been
-  !> recorded.
+  !> Records why the disks in the file cannot be used; only the first reason is kept.
   subroutine refuse(me, why)
     type(species_settings_t), intent(inout) :: me
     character(len=*), intent(in) :: why
@@ -84,9 +85,9 @@ contains
     if (.not. allocated(me%in_file%error)) call fail(me%in_file%error, exit_usage, why)
   end subroutine refuse
 
-  !> Completes the table of disks with values from the input, and reports each quantity that both
-  !> lack or that a text file and the input both contain. If the output file of a run and the input
-  !> contain the same quantity, the value in the input is used, and no error is reported.
+  !> Completes the table of disks with values from the input. Quantities missing in both are
+  !> reported, and also quantities given in both if the file is a text file. If the file is the
+  !> output of a run, the value in the input takes precedence.
   subroutine join(me)
     type(species_settings_t), intent(inout) :: me
     logical :: wanted(radius_row:mass_row)
@@ -111,7 +112,7 @@ contains
 
   contains
 
-    !> Reports an error if a quantity is given twice: in a column of a text file and in the input.
+    !> Reports a quantity that is given twice, in a column of a text file and in the input.
     subroutine refuse_both(row, variable)
       integer, intent(in) :: row
       character(len=*), intent(in) :: variable
@@ -121,7 +122,7 @@ contains
     end subroutine refuse_both
   end subroutine join
 
-  !> Reports each number in the file outside the range of numbers allowed in the input.
+  !> Reports each number in the file that is outside the range allowed in the input.
   subroutine check_numbers(me, farthest)
     type(species_settings_t), intent(inout) :: me
     real(real64), intent(in) :: farthest                      !! largest coordinate in the box [length]
@@ -131,7 +132,7 @@ contains
     do k = 1, size(me%in_file%rows)
       do row = 1, mass_row
         associate (number => me%in_file%table(row, k))
-          wrong = .not. ieee_is_finite(number)                ! debug builds stop if NaN is compared
+          wrong = .not. ieee_is_finite(number)                ! debug builds stop when NaN is compared
           if (.not. wrong) wrong = number > largest .or. number < merge(smallest, -largest, row >= radius_row)
           if (.not. wrong) cycle
         end associate
@@ -147,7 +148,7 @@ contains
 
   contains
 
-    !> Reports that a number in the file is invalid.
+    !> Reports an invalid number in the file.
     subroutine object(what)
       character(len=*), intent(in) :: what
 
@@ -155,7 +156,7 @@ contains
     end subroutine object
   end subroutine check_numbers
 
-  !> Location of a disk in its file, for messages: a line of a text file, or a row of a dataset.
+  !> Location of a disk in its file, for messages: a line of a text file or a row of a dataset.
   pure function origin(me, k, column) result(text)
     type(species_settings_t), intent(in) :: me
     integer, intent(in) :: k                                  !! index of the disk in its species
