@@ -1,5 +1,6 @@
-!> Active Brownian disks: Brownian dynamics with an additional self-propulsion velocity along the orientation of each disk. The
-!> orientation diffuses and, for chiral disks, turns at a constant rate.
+!> Active Brownian disks: Brownian dynamics with an additional self-propulsion velocity along the
+!> orientation of each disk. The orientation diffuses; that of chiral disks also turns at a constant
+!> rate.
 module active
   use kinds, only: int32, pi, real64
   use box_geometry, only: box_t
@@ -32,7 +33,7 @@ module active
   type, extends(brownian_t) :: active_t
     real(real64) :: speed = 0.0_real64           !! self-propulsion speed [length/time]
     real(real64) :: rotational_diffusion = 0.0_real64   !! rotational diffusion coefficient [1/time]
-    real(real64) :: turning_rate = 0.0_real64    !! constant rate at which the orientation turns [1/time]
+    real(real64) :: turning_rate = 0.0_real64    !! constant angular velocity of the orientation [1/time]
   contains
     procedure :: read => read_propulsion
     procedure :: check
@@ -55,7 +56,7 @@ contains
     call fields%read("turning_rate", self%turning_rate)
   end subroutine read_propulsion
 
-  !> Mean square of the velocity that a kick sets.
+  !> Mean square of the velocities set by a kick.
   pure function speed2(self, mass)
     class(active_t), intent(in) :: self
     real(real64), intent(in) :: mass             !! [mass]
@@ -64,7 +65,7 @@ contains
     speed2 = self%brownian_t%speed2(mass) + self%speed**2
   end function speed2
 
-  !> Accepts any temperature: active disks move even at temperature 0.
+  !> Accepts any temperature, because active disks move even at temperature 0.
   subroutine check(self, fields, box, count, radius)
     class(active_t), intent(in) :: self
     class(fields_t), intent(inout) :: fields
@@ -97,7 +98,8 @@ contains
     end do
   end subroutine prepare
 
-  !> Turns the orientation of disk i at the constant rate and by rotational diffusion, and adds the self-propulsion velocity.
+  !> Changes the orientation of disk i by the constant turning rate and by rotational diffusion, and
+  !> adds the self-propulsion velocity.
   subroutine propel(self, sim, i, v)
     class(active_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim

@@ -1,4 +1,5 @@
-!> Andersen thermostat: a kick draws new velocities from the Maxwell distribution for a random fraction of the disks.
+!> Andersen thermostat: each kick draws new velocities from the Maxwell distribution for a random
+!> fraction of the disks.
 module andersen
   use kinds, only: real64
   use brownian, only: brownian_t
@@ -19,7 +20,7 @@ module andersen
       //"the Andersen thermostat.", part_of_all, goes_with="kind "//word, may_change=in_motion)]
 
   type, extends(brownian_t) :: andersen_t
-    real(real64) :: fraction = 1.0_real64        !! probability that a kick affects a given disk
+    real(real64) :: fraction = 1.0_real64        !! probability that a disk is affected by a kick
   contains
     procedure :: read => read_thermostat
     procedure :: acts_on_all
@@ -37,7 +38,7 @@ contains
     call fields%read("fraction", self%fraction)
   end subroutine read_thermostat
 
-  !> Whether each kick changes the velocities of all disks.
+  !> True if each kick changes the velocities of all disks.
   pure function acts_on_all(self) result(yes)
     class(andersen_t), intent(in) :: self
     logical :: yes
@@ -45,7 +46,7 @@ contains
     yes = self%brownian_t%acts_on_all() .and. .not. self%fraction < 1
   end function acts_on_all
 
-  !> Draws whether a kick affects a disk.
+  !> Decides at random whether a kick affects a disk.
   subroutine draw_hit(self, stream, is_hit)
     class(andersen_t), intent(in) :: self
     type(random_stream_t), intent(inout) :: stream

@@ -1,5 +1,5 @@
-!> Event-driven Brownian dynamics: each kick draws the velocities of the disks from the Maxwell distribution. The Andersen
-!> thermostat and active disks extend this kind of driving.
+!> Event-driven Brownian dynamics: each kick draws the velocities of all disks from the Maxwell
+!> distribution. The Andersen thermostat and active disks extend this type.
 module brownian
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
@@ -38,7 +38,7 @@ contains
     call fields%read("temperature", self%temperature)
   end subroutine read_bath
 
-  !> Reports the temperature 0, at which each kick would stop the disks.
+  !> Reports a temperature of 0, at which each kick would stop the disks.
   subroutine check(self, fields, box, count, radius)
     class(brownian_t), intent(in) :: self
     class(fields_t), intent(inout) :: fields
@@ -50,8 +50,9 @@ contains
       call fields%complain("temperature", "0 needs kind = 'active'; allowed: a number > 0")
   end subroutine check
 
-  !> Draws new velocities and angular velocities; in a sheared box, relative to the velocity profile. The random numbers depend only
-  !> on the seed, the id of the disk and the number of the kick, not on the order of the disks or the history of the run.
+  !> Draws new velocities and angular velocities, relative to the velocity profile in a sheared box.
+  !> The random numbers depend only on the seed, the id of the disk and the number of the kick, not
+  !> on the order of the disks or the history of the run.
   subroutine kick(self, sim, kicked)
     class(brownian_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
@@ -85,7 +86,7 @@ contains
     kicked = kicked(:n)
   end subroutine kick
 
-  !> Mean square of the velocity that a kick sets.
+  !> Mean square of the velocities set by a kick.
   pure function speed2(self, mass)
     class(brownian_t), intent(in) :: self
     real(real64), intent(in) :: mass             !! [mass]
@@ -94,7 +95,7 @@ contains
     speed2 = 2*self%temperature/mass
   end function speed2
 
-  !> Determines whether a kick affects a disk; in Brownian dynamics it always does.
+  !> Decides whether a kick affects a disk. In Brownian dynamics, every kick affects all disks.
   subroutine draw_hit(self, stream, is_hit)
     class(brownian_t), intent(in) :: self
     type(random_stream_t), intent(inout) :: stream
@@ -103,7 +104,7 @@ contains
     is_hit = .true.
   end subroutine draw_hit
 
-  !> Adds a self-propulsion velocity to the new velocity of disk i; Brownian dynamics has none.
+  !> Adds the self-propulsion velocity of disk i, which is zero in Brownian dynamics.
   subroutine propel(self, sim, i, v)
     class(brownian_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim

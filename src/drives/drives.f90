@@ -1,5 +1,5 @@
-!> The kinds of driving: their keywords in the input, their types, and the variables of the group
-!> `&drive`. A new kind is a file of this folder, and a line in each list of this module.
+!> Types of driving: their keywords in the input, their derived types, and the variables of the
+!> group `&drive`. A new type requires a file in this folder and a line in each list of this module.
 module drives
   use active, only: active_t, active_choices => choices, active_rows => rows, active_word => word
   use andersen, only: andersen_t, andersen_choices => choices, andersen_rows => rows, andersen_word => word
@@ -13,11 +13,10 @@ module drives
   private
   public :: choose_drive, counting_drives, drive_choices, drive_counters, drive_rows
 
-  !> Keywords of the kinds of driving, separated by blanks: all kinds, and the kinds with a
-  !> temperature.
+  !> Keywords of the types of driving, separated by blanks: all types, and those with a temperature.
   character(len=*), parameter :: with_temperature = andersen_word//" "//brownian_word//" "//active_word//" "//recycle_word
   character(len=*), parameter :: kinds = noise_word//" "//with_temperature
-  !> The kind of driving that counts its actions on each disk, and the name of its `counter`.
+  !> The type of driving that counts its actions on each disk, and the name of its `counter`.
   character(len=*), parameter :: counting_drives = recycle_word, drive_counters = recycle_count_word
 
   type(choice_t), parameter :: drive_choices(*) = [ &
@@ -48,7 +47,7 @@ module drives
 
 contains
 
-  !> Creates the driving of a given kind; not allocated for 'none'.
+  !> Creates the driving for a keyword; for 'none' the result is not allocated.
   subroutine choose_drive(word, drive)
     character(len=*), intent(in) :: word
     class(drive_t), allocatable, intent(out) :: drive
@@ -64,7 +63,7 @@ contains
       allocate (active_t :: drive)
     case (recycle_word)
       allocate (recycle_t :: drive)
-    case default                                 ! the disks are not driven
+    case default                                 ! no driving
     end select
   end subroutine choose_drive
 

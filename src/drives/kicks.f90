@@ -1,4 +1,4 @@
-!> Steps that several kinds of driving have in common.
+!> Common steps of several types of driving.
 module kicks
   use kinds, only: int32, real64
   use disks, only: advance_disk
@@ -10,9 +10,9 @@ module kicks
 
 contains
 
-  !> Advances disk i to the present time, at which a kick interrupts its trajectory. Its last
-  !> collision partner is erased, because the kick may cause another collision with the same partner
-  !> immediately.
+  !> Advances disk i to the present time, at which a kick changes its trajectory. The last collision
+  !> partner is erased, because the disk may collide with the same partner again immediately after
+  !> the kick.
   pure subroutine interrupt_disk(sim, i)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -22,7 +22,8 @@ contains
     sim%tag(i)%last_partner = 0
   end subroutine interrupt_disk
 
-  !> Sets the velocity of disk i and adds the change of its energy to the sum `drive_energy`.
+  !> Sets the velocity of disk i and adds the change of its kinetic energy to the sum
+  !> `drive_energy`.
   subroutine change_velocity(sim, i, v)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -35,7 +36,8 @@ contains
     call sim%record_velocity_change(i, before, sim%now)
   end subroutine change_velocity
 
-  !> Sets the angular velocity of disk i and adds the change of its energy to the sum `drive_energy`.
+  !> Sets the angular velocity of disk i and adds the change of its rotational energy to the sum
+  !> `drive_energy`.
   subroutine change_spin(sim, i, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -1,4 +1,5 @@
-!> White-noise driving: each kick adds a Gaussian random number to each component of the velocities.
+!> White-noise driving: each kick adds a Gaussian random number to each velocity component of the
+!> driven disks.
 module noise
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
@@ -26,7 +27,7 @@ module noise
       //"kick.", goes_with="kind "//word, may_change=in_motion)]
 
   type, extends(drive_t) :: noise_t
-    !> Noise strength: growth rate of the variance of each velocity component [velocity**2/time]
+    !> Noise strength: growth rate of the variance of each velocity component [velocity**2/time].
     real(real64) :: strength = 0.0_real64
     logical :: keep_momentum = .true.            !! whether the noise conserves the total momentum
   contains
@@ -47,7 +48,8 @@ contains
     call fields%read("keep_momentum", self%keep_momentum)
   end subroutine read_noise
 
-  !> Reports noise that would never change the velocity of the only driven disk.
+  !> Reports noise that conserves momentum although only one disk is driven; its velocity would
+  !> never change.
   subroutine check(self, fields, box, count, radius)
     class(noise_t), intent(in) :: self
     class(fields_t), intent(inout) :: fields
@@ -65,7 +67,8 @@ contains
     class(noise_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable, intent(out) :: kicked(:)
-    real(real64), allocatable :: draws(:, :)     ! (2,n) random numbers of the driven disks, needed to restore the momentum
+    ! shape (2, n): random numbers of the driven disks, needed for restoring the momentum
+    real(real64), allocatable :: draws(:, :)
     type(random_stream_t) :: stream
     real(real64) :: z(2), scale
     integer(int64) :: key
@@ -90,13 +93,13 @@ contains
     if (self%keep_momentum) call restore_momentum(sim, kicked, scale, draws)
   end subroutine kick
 
-  !> Subtracts the mean velocity added by the noise. The sums over the disks are exact and do not
-  !> depend on their order.
+  !> Subtracts the mean of the velocities added by the noise. Sums over the disks are exact and
+  !> therefore independent of the order of the disks.
   subroutine restore_momentum(sim, kicked, scale, draws)
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: kicked(:)      !! (n) indices of the driven disks
+    integer(int32), intent(in) :: kicked(:)      !! indices of the n driven disks
     real(real64), intent(in) :: scale            !! standard deviation of the noise [length/time]
-    real(real64), intent(in) :: draws(:, :)      !! (2,n) Gaussian random numbers of variance 1
+    real(real64), intent(in) :: draws(:, :)      !! Gaussian random numbers of unit variance; shape (2, n)
     type(exact_sum_t) :: momentum(2), mass
     real(real64) :: heaviest
     integer(int32) :: k
@@ -115,7 +118,7 @@ contains
     end do
   end subroutine restore_momentum
 
-  !> Mean square of the velocity that the noise adds.
+  !> Mean square of the velocity added by a kick.
   pure function speed2(self, mass)
     class(noise_t), intent(in) :: self
     real(real64), intent(in) :: mass             !! [mass]

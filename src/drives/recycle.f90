@@ -1,6 +1,7 @@
-!> Recycling: at regular times, each disk with its centre in one region is moved to a random position in another, which leads to a
-!> steady state of a discharging hopper or of a gas escaping through an opening. The random numbers of a move depend only on the
-!> seed, the id of the disk and the number of the kick.
+!> Recycling: at regular intervals, each disk with its centre in one region is moved to a random
+!> position in another region. A discharging hopper, or a gas escaping through an opening, thereby
+!> reaches a steady state. The random numbers depend only on the seed, the id of the disk and the
+!> number of the kick.
 module recycle
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: box_t
@@ -39,11 +40,14 @@ module recycle
       unit="length", goes_with="kind "//word, may_change=in_motion)]
 
   type, extends(drive_t) :: recycle_t
-    real(real64) :: from_region(4) = 0.0_real64  !! region in which disks are recycled: xlo, xhi, ylo, yhi [length]
-    real(real64) :: to_region(4) = 0.0_real64    !! region to which recycled disks move: xlo, xhi, ylo, yhi [length]
-    real(real64) :: velocity(2) = 0.0_real64     !! velocity of recycled disks, if `temperature` is 0 [length/time]
-    !> kT of the Maxwell distribution of the velocities of recycled disks; 0 if they are not drawn
-    !> [energy]
+    !> Disks are taken from this region: xlo, xhi, ylo, yhi [length].
+    real(real64) :: from_region(4) = 0.0_real64
+    !> Disks are moved to this region: xlo, xhi, ylo, yhi [length].
+    real(real64) :: to_region(4) = 0.0_real64
+    !> Velocity of recycled disks if `temperature` is 0 [length/time].
+    real(real64) :: velocity(2) = 0.0_real64
+    !> kT of the Maxwell distribution from which the velocities of recycled disks are drawn; 0 for a
+    !> fixed velocity [energy].
     real(real64) :: temperature = 0.0_real64
   contains
     procedure :: read => read_regions
@@ -70,15 +74,15 @@ contains
     call fields%read("to_region", self%to_region)
   end subroutine read_regions
 
-  !> Checks the two regions, which must lie in the box without overlapping. The region to which
-  !> disks move must be wide enough for a disk and free of obstacles.
+  !> Checks the two regions, which must lie in the box and must not overlap. The region to which
+  !> disks are moved must be free of obstacles and wide enough for a disk.
   subroutine check(self, fields, box, count, radius)
     class(recycle_t), intent(in) :: self
     class(fields_t), intent(inout) :: fields
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: count(:)
     real(real64), intent(in) :: radius(:)
-    real(real64) :: largest                                  ! largest radius of recycled disks [length]
+    real(real64) :: largest                                  ! largest radius of the recycled disks [length]
     logical :: sound(2)
     integer :: k
 
@@ -98,7 +102,7 @@ contains
     end associate
   end subroutine check
 
-  !> Recycled disks jump, so that displacements are undefined.
+  !> Recycled disks jump, so that their displacements are undefined.
   pure function conflict(self, setting) result(reason)
     class(recycle_t), intent(in) :: self
     character(len=*), intent(in) :: setting
@@ -118,7 +122,7 @@ contains
     speed2 = 2*self%temperature/mass + sum(self%velocity**2)
   end function speed2
 
-  !> Recycling changes only the velocities of disks that it moves.
+  !> Recycling changes only the velocities of the disks that it moves.
   pure function acts_on_all(self) result(yes)
     class(recycle_t), intent(in) :: self
     logical :: yes
@@ -134,7 +138,8 @@ contains
     yes = .true.
   end function moves_disks
 
-  !> Whether any disk is in the region from which disks are recycled. If no further event can occur, no other disk will enter it.
+  !> True if the centre of any disk is in `from_region`. If no further event can occur, no other
+  !> disk will enter this region.
   pure function can_act(self, sim) result(yes)
     class(recycle_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -148,7 +153,7 @@ contains
     end do
   end function can_act
 
-  !> Name of the number of times that each disk has been recycled.
+  !> Name of the counter that stores how often each disk has been recycled.
   pure function counter(self) result(name)
     class(recycle_t), intent(in) :: self
     character(len=:), allocatable :: name
@@ -156,9 +161,10 @@ contains
     name = count_word
   end function counter
 
-  !> Moves each disk with its centre in `from_region` to a free position in `to_region`, in the order of the ids, and lists the
-  !> moved disks. A free position is one at which the disk overlaps no other disk, no obstacle and no side; without one, the disk is
-  !> not moved. The former positions of moved disks count as occupied until the procedure returns.
+  !> Moves each disk with its centre in `from_region` to a free position in `to_region`, in the
+  !> order of the ids, and returns the list of moved disks. At a free position the disk overlaps no
+  !> other disk, no obstacle and no side. If there is none, the disk is not moved. The old positions
+  !> of moved disks count as occupied until the procedure returns.
   subroutine recycle_disks(self, sim, kicked)
     class(recycle_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
@@ -192,7 +198,7 @@ contains
     kicked = kicked(:n_moved)
   end subroutine recycle_disks
 
-  !> Whether the centre of disk i is in the region from which disks are recycled.
+  !> True if the centre of disk i is in `from_region`.
   pure function is_due(self, sim, i) result(yes)
     class(recycle_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -208,9 +214,10 @@ contains
     end associate
   end function is_due
 
-  !> Moves disk i to a new position, where a new trajectory starts: its last collision partner, the time of its last contact and its
-  !> image counters are reset. It receives the given velocity without rotation, or velocity and rotation from the Maxwell
-  !> distribution. The change of its kinetic, rotational and potential energy is added to `drive_energy`.
+  !> Moves disk i to a new position. Its trajectory begins anew: the last collision partner, the
+  !> time of the last contact and the image counters are reset. The disk receives the given velocity
+  !> without rotation, or a velocity and rotation from the Maxwell distribution. The change of its
+  !> total energy (kinetic, rotational and potential) is added to `drive_energy`.
   subroutine move_disk(self, sim, i, x, stream)
     class(recycle_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
