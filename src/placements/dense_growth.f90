@@ -1,9 +1,9 @@
 !> Dense random packings by Lubachevsky-Stillinger compression (Lubachevsky and Stillinger, 1990,
-!> doi:10.1007/BF01025983): the disks start small, move as an elastic gas, and grow to their full
-!> size. The growth is continuous in the original algorithm. Here, between short runs of ordinary
-!> event-driven dynamics at constant size, every disk grows in a single step into the gap between it
-!> and its neighbours. Given initial positions are kept; the disks then start with the largest size
-!> at which they do not overlap.
+!> doi:10.1007/BF01025983): initially small disks move as an elastic gas and grow to their full
+!> size. The original algorithm grows the disks continuously. Here, short runs of event-driven
+!> dynamics at constant size alternate with growth steps, in which every disk grows into the gap
+!> between it and its neighbours. If initial positions are given, the disks start there with the
+!> largest size at which they do not overlap.
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -24,26 +24,28 @@ module dense_growth
   private
   public :: grow_disks, smallest_scale
 
-  real(real64), parameter :: loose = 0.4_real64         !! packing fraction of the small disks that are inserted at random positions
-  !> Largest ratio of the relative sizes of two disks during growth. The relative size of a disk is
+  real(real64), parameter :: loose = 0.4_real64      !! packing fraction of the small disks inserted at random
+  !> Maximum ratio of the relative sizes of two disks during growth. The relative size of a disk is
   !> its radius divided by its full radius.
   real(real64), parameter :: lead = 1.02_real64
-  real(real64), parameter :: caution = 0.9_real64       !! fraction of the available gap that a disk fills in one growth step
-  real(real64), parameter :: smallest_scale = 1.0e-3_real64       !! smallest initial size, relative to the full size
-  !> Number of growth steps in which disks at given positions reach the largest possible size, each
-  !> closing nine tenths of the remaining gaps.
+  !> Fraction of the available gap that is filled in a growth step.
+  real(real64), parameter :: caution = 0.9_real64
+  !> Minimum initial size, relative to the full size.
+  real(real64), parameter :: smallest_scale = 1.0e-3_real64
+  !> Number of initial growth steps of disks at given positions. Each step closes nine tenths of the
+  !> remaining gaps, so that the disks reach the largest possible size.
   integer, parameter :: approaches = 6
-  integer, parameter :: run_length = 2                  !! number of collisions per disk between two growth steps
-  integer, parameter :: mixing_length = 10              !! number of collisions per disk after the growth
-  !> Number of growth steps between two checks. The growth has failed if less than a tenth of the
-  !> remaining growth has been made since the previous check.
+  integer, parameter :: run_length = 2                  !! collisions per disk between two growth steps
+  integer, parameter :: mixing_length = 10              !! collisions per disk after the growth
+  !> Number of growth steps between two checks of the progress. The growth has failed if less than a
+  !> tenth of the remaining growth was achieved since the previous check.
   integer, parameter :: jumps_per_check = 50
 
-  !> Elastic disks that grow.
+  !> Growing elastic disks.
   type :: growth_t
     type(simulation_t) :: sim
     type(event_driven_t), allocatable :: evolution
-    real(real64), allocatable :: full(:)                !! (n) radii to be reached, in the order of species [length]
+    real(real64), allocatable :: full(:)                !! final radii, in the order of the species [length]
     type(random_stream_t) :: stream
     type(error_t), allocatable :: error
   contains
@@ -58,15 +60,15 @@ module dense_growth
 
 contains
 
-  !> Finds positions for all disks of several species in a box.
+  !> Generates a dense packing of the disks of several species in a box.
   subroutine grow_disks(box, species, full, stream, line, x, error)
-    type(box_t), intent(in) :: box                      !! box with its obstacles; its gravity and shear are ignored
+    type(box_t), intent(in) :: box      !! box with its obstacles; gravity and shear are ignored
     type(species_t), intent(in) :: species(:)
-    real(real64), intent(in) :: full(:)                 !! (n) radii to be reached, in the order of species [length]
+    real(real64), intent(in) :: full(:)                 !! final radii, in the order of the species [length]
     type(random_stream_t), intent(inout) :: stream
-    class(status_line_t), intent(inout) :: line         !! status line that shows the progress
-    !> (2,n) positions of the disks, species by species [length]. On entry, initial positions, or
-    !> shape (2,0) for random ones; on return, the final positions.
+    class(status_line_t), intent(inout) :: line         !! status line for the progress
+    !> Positions of the disks, species by species; shape (2, n) [length]. On entry, the initial
+    !> positions, or shape (2,0) for random positions; on return, the final positions.
     real(real64), allocatable, intent(inout) :: x(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(growth_t) :: growth
@@ -97,7 +99,7 @@ contains
     end associate
   end subroutine grow_disks
 
-  !> Moves and grows the disks alternately until they have their full radii.
+  !> Alternately moves and grows the disks until they have their full radii.
   subroutine grow_to_full_size(self, line)
     class(growth_t), intent(inout) :: self
     class(status_line_t), intent(inout) :: line
@@ -128,7 +130,7 @@ contains
     end do
   end subroutine grow_to_full_size
 
-  !> Reports that the growth has failed, with the packing fraction that was reached.
+  !> Reports that the growth failed, and which packing fraction was reached.
   subroutine fail_to_grow(self)
     class(growth_t), intent(inout) :: self
     real(real64) :: reached, wanted
@@ -143,11 +145,11 @@ contains
       //written(wanted)//"; "//advice)
   end subroutine fail_to_grow
 
-  !> Starts the growth with disks at the given positions and random velocities. All radii are
-  !> reduced by the same factor, just enough to remove all overlaps.
+  !> Starts with disks at the given positions and with random velocities. All radii are reduced by
+  !> the same factor, just enough to remove all overlaps.
   subroutine start_at_positions(self, x)
     class(growth_t), intent(inout) :: self
-    real(real64), intent(in) :: x(:, :)                 !! (2,n) [length]
+    real(real64), intent(in) :: x(:, :)                 !! shape (2, n) [length]
     real(real64) :: scale
     integer :: k
 
@@ -164,7 +166,7 @@ contains
     if (scale <= smallest_scale) call self%fail_to_grow()
   end subroutine start_at_positions
 
-  !> Starts the growth with small disks at random positions, with random velocities.
+  !> Starts with small disks at random positions and with random velocities.
   subroutine insert_small_disks(self, line)
     class(growth_t), intent(inout) :: self
     class(status_line_t), intent(inout) :: line
@@ -176,8 +178,7 @@ contains
     wanted = 0
     do k = 1, size(self%sim%species)
       associate (own => self%full(disks_before(self%sim%species, k) + 1:disks_before(self%sim%species, k + 1)))
-        ! If all radii are equal, every term of the sum is 1, and the sum is free of rounding
-        ! errors.
+        ! For equal radii every term of the sum is 1, so that the sum is free of rounding errors.
         wanted = wanted + own(1)**2*sum((own/own(1))**2)
       end associate
     end do
@@ -199,11 +200,11 @@ contains
     end do
   end subroutine insert_small_disks
 
-  !> Inserts all disks at random positions, starting with the largest disks.
+  !> Inserts all disks at random positions, in the order of decreasing size.
   subroutine fill(self, packing, radius, line, complete)
     class(growth_t), intent(inout) :: self
     type(packing_t), intent(out) :: packing
-    real(real64), intent(in) :: radius(:)               !! (n) radius of each disk [length]
+    real(real64), intent(in) :: radius(:)               !! radius of each disk [length]
     class(status_line_t), intent(inout) :: line
     logical, intent(out) :: complete
     logical :: waiting(size(self%sim%species))
@@ -228,27 +229,27 @@ contains
     end associate
   end subroutine fill
 
-  !> Advances the simulation by a given number of collisions per disk and brings the positions of
-  !> all disks to the present time.
+  !> Advances the simulation by a number of collisions per disk, then advances all disks to the
+  !> present time.
   subroutine move(self, length)
     class(growth_t), intent(inout) :: self
-    integer, intent(in) :: length                       !! collisions per disk
+    integer, intent(in) :: length                       !! number of collisions per disk
     type(limits_t) :: limits
-    integer(int64) :: to_come                           ! number of collisions still to be executed, summed over the disks
+    integer(int64) :: to_come                           ! remaining number of collisions, twice for each pair
     integer(int32) :: i
 
     associate (sim => self%sim)
       call self%evolution%start(sim)
       to_come = int(length, int64)*sim%n_disks()
       limits%collisions = sim%tally%collisions + (to_come + 1)/2
-      limits%events = sim%tally%events + 4*to_come      ! the limit on events ends the run if a disk is trapped between obstacles
-      limits%time = sim%time() + maxval(sim%box%edges())          ! the time limit ends the run if the disks never collide
+      limits%events = sim%tally%events + 4*to_come      ! ends the run if a disk is trapped between obstacles
+      limits%time = sim%time() + maxval(sim%box%edges())          ! ends the run if the disks never collide
       call advance(self%evolution, sim, limits, self%error)
       do i = 1, sim%n_disks()
         sim%disk(i)%x = sim%position(i)
         sim%disk(i)%clock = sim%now
-        ! Growth may close the gap between a disk and its last partner, after which the two may
-        ! collide again.
+        ! Growth may close the gap between a disk and its last partner; the two may then collide
+        ! again.
         sim%tag(i)%last_partner = 0
       end do
     end associate
@@ -259,9 +260,9 @@ contains
   !> one of them already exceeds its share.
   subroutine grow(self, cap)
     class(growth_t), intent(inout) :: self
-    real(real64), intent(in) :: cap                     !! largest allowed size, relative to the full size
+    real(real64), intent(in) :: cap                     !! maximum size, relative to the full size
     type(packing_t) :: packing
-    real(real64), allocatable :: full(:), scale(:)      ! full radius of each disk [length], and its present part
+    real(real64), allocatable :: full(:), scale(:)      ! full radius [length] and relative size of each disk
     real(real64) :: room, distance, shared
     integer(int32), allocatable :: list(:)
     integer(int32) :: i, k, n
@@ -298,8 +299,8 @@ contains
     end associate
   end subroutine grow
 
-  !> Distance from a point to the nearest side or obstacle. Obstacles beyond the largest radius of a
-  !> disk may be ignored, because they do not limit its growth.
+  !> Distance from a point to the nearest side or obstacle. Obstacles farther away than the largest
+  !> radius may be ignored, because they do not limit the growth.
   pure function wall_distance(packing, x) result(distance)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: x(2)                    !! [length]

@@ -1,5 +1,5 @@
-!> Placement by compression, see `dense_growth`. All species of one region are compressed together,
-!> with the disks placed earlier as fixed obstacles.
+!> Placement by compression (see `dense_growth`). All species of a region are compressed together;
+!> disks placed earlier act as fixed obstacles.
 module dense_placement
   use box_geometry, only: box_t
   use box_sides, only: bounds, spans
@@ -40,8 +40,8 @@ contains
     turn = in_batches
   end function turn
 
-  !> Compresses the disks in a box with the shape of the region. If positions are given, the
-  !> compression starts there.
+  !> Compresses the disks in a box with the shape of the region, starting at their positions if
+  !> these are given.
   subroutine place(self, batch, packing, line, fields)
     class(dense_placement_t), intent(in) :: self
     type(batch_t), intent(inout) :: batch
@@ -58,8 +58,8 @@ contains
     if (allocated(error)) call fields%complain("placement", error%message)
   end subroutine place
 
-  !> Creates the box for a compression: the region, without any part beyond a displaced side. Disks
-  !> placed earlier, and their periodic images, become obstacles if they extend into it.
+  !> Creates the box for a compression: the region, cut off at displaced sides. Disks placed earlier
+  !> and their periodic images become obstacles if they extend into the box.
   function growth_box(packing, region) result(box)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: region(4)
@@ -74,7 +74,7 @@ contains
     box%upper = min(region([2, 4]), box%upper)
     box%periodic = spans(region, packing%box)
     images = packing%box%images()
-    do pass = 1, 2  ! the first pass counts the obstacles, the second creates them
+    do pass = 1, 2  ! first count the obstacles, then create them
       n = packing%box%n_obstacles()
       do k = 1, size(packing%disk)
         if (packing%disk(k)%species == 0) cycle
@@ -87,8 +87,9 @@ contains
           allocate (box%obstacle(n)%shape, source=new_circle(centre, radius, encloses=.false.))
         end do
       end do
+        ! all obstacles of the new box are elastic
       if (pass == 1) call box%add_obstacles(["obstacles", "disks    "], &
-        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])                  ! all obstacles of the new box are elastic
+        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])
     end do
     do k = 1, packing%box%n_obstacles()
       allocate (box%obstacle(k)%shape, source=packing%box%obstacle(k)%shape)

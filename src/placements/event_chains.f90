@@ -4,20 +4,20 @@
 !> the sum of all displacements equals the length of the chain. Chains along x and along y
 !> alternate.
 !>
-!> Along a periodic axis all chains move to the right or upwards. The state of a chain consists of
+!> Along a periodic axis, all chains move to the right or upwards. The state of a chain consists of
 !> the positions of all disks and the index of the moving disk. Each state has exactly one
-!> predecessor, and the motion preserves the volume of a set of states. The uniform distribution of
-!> all packings is therefore stationary (global balance), although no chain moves backwards. This
-!> requires that the first disk of each chain is drawn uniformly from all disks, and that the length
-!> of the chain does not depend on the positions.
+!> predecessor, and the motion preserves the volume in the space of states. Therefore the uniform
+!> distribution of all packings is stationary (global balance), although no chain moves backwards.
+!> This requires that the first disk of each chain is drawn uniformly from all disks, and that the
+!> length of the chain is independent of the positions.
 !>
-!> Along an axis with sides, a disk that reaches a side reverses its direction and continues
-!> (straight event chains in a box with walls, Li et al., 2022, doi:10.1063/5.0126437). The state
-!> then includes the direction. Each state still has exactly one predecessor, because a disk that
-!> touches a side and moves away from it has just been reflected. The initial direction is random,
-!> because the uniform distribution is stationary only if both directions are equally probable. A
-!> chain between two sides that is reversed at its end leads back to its start, so such chains also
-!> satisfy detailed balance.
+!> Along an axis with walls, a disk that reaches a side reverses its direction and continues
+!> (straight event chains in a box with walls, Li et al., 2022, doi:10.1063/5.0126437). The state of
+!> a chain then includes the direction. Each state still has exactly one predecessor: a disk that
+!> touches a side and moves away from it must have been reflected just before. The initial direction
+!> is drawn at random, because the uniform distribution is stationary only if both directions are
+!> equally probable. Reversing a chain between two sides at its end leads back to its start, so such
+!> chains also satisfy detailed balance.
 !>
 !> If the radii differ, a swap is attempted after each chain: two disks, drawn uniformly from all
 !> disks, exchange their positions unless the larger one would overlap another disk or a side
@@ -34,30 +34,31 @@ module event_chains
   private
   public :: relax, shuffle
 
-  real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! packing fraction of the triangular lattice
-  integer, parameter :: stream_number = 8         !! number of the random streams used by this module
+  !> Packing fraction of the triangular lattice.
+  real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)
+  integer, parameter :: stream_number = 8         !! key of the random streams of this module
   integer, parameter :: chains_per_look = 1024    !! number of chains between two updates of the status line
-  !> Smallest fraction of the length of a chain that `usual_steps` successive moves must cover; a
-  !> chain that falls behind is jammed and ends.
+  !> Minimum fraction of the length of a chain that `usual_steps` successive moves must cover. A
+  !> chain that covers less is jammed and ends.
   real(real64), parameter :: jammed = 1.0e-3_real64
 
 contains
 
-  !> Equilibrates the disks of a packing without overlaps. The random numbers of a sweep depend only
-  !> on the seed of the run and on the number of the sweep.
+  !> Equilibrates a packing of disks that do not overlap. The random numbers of a sweep depend only
+  !> on the seed of the run and the number of the sweep.
   subroutine relax(box, radius, seed, sweeps, line, x)
-    type(box_t), intent(in) :: box                !! box without obstacles; its gravity and shear are ignored
-    real(real64), intent(in) :: radius(:)         !! (n) [length]
+    type(box_t), intent(in) :: box                !! box without obstacles; gravity and shear are ignored
+    real(real64), intent(in) :: radius(:)         !! shape (n) [length]
     integer(int64), intent(in) :: seed            !! seed of the run
-    integer(int64), intent(in) :: sweeps          !! number of sweeps; a sweep consists of n chains
-    class(status_line_t), intent(inout) :: line   !! status line that shows the progress
-    real(real64), intent(inout) :: x(:, :)        !! (2,n) positions [length]
+    integer(int64), intent(in) :: sweeps          !! number of sweeps of n chains each
+    class(status_line_t), intent(inout) :: line   !! status line for the progress
+    real(real64), intent(inout) :: x(:, :)        !! positions; shape (2, n) [length]
     type(packing_t) :: packing
     type(random_stream_t) :: stream
     real(real64) :: mean_length(2), u
     integer(int64) :: sweep
     integer(int32) :: n, k, first, other
-    integer(int64) :: swapped(2)                  ! numbers of attempted and of accepted swaps
+    integer(int64) :: swapped(2)                  ! numbers of attempted and accepted swaps
     integer :: axis, sense, usual_steps
     logical :: swaps
 
@@ -94,8 +95,8 @@ contains
     call line%tell(report(sweeps, swapped))
   end subroutine relax
 
-  !> Report on a relaxation. The share of accepted swaps shows how well disks of different radii
-  !> have been mixed.
+  !> Report about the equilibration. The fraction of accepted swaps shows how well disks of
+  !> different radii are mixed.
   pure function report(sweeps, swapped) result(text)
     integer(int64), intent(in) :: sweeps, swapped(2)
     character(len=:), allocatable :: text
@@ -104,7 +105,7 @@ contains
     if (swapped(1) > 0) text = text//", "//written(swapped(2))//" of "//written(swapped(1))//" swaps of different radii accepted"
   end function report
 
-  !> Fills a packing with disks, divided into layers within which the radii differ by less than a
+  !> Adds the disks to a packing with layers, within each of which the radii differ by less than a
   !> factor of two.
   subroutine fill(packing, box, radius, x)
     type(packing_t), intent(out) :: packing
@@ -128,11 +129,11 @@ contains
     end do
   end subroutine fill
 
-  !> Estimate of the mean displacement of a disk in a chain. In equilibrium the mean distance
-  !> between two successive disks of a chain along its direction, which is pi/4 diameters, divided
-  !> by the mean displacement of a disk is Z - 1, where Z is the compressibility factor (Michel,
-  !> Kapfer and Krauth, 2014, doi:10.1063/1.4863991). For Z - 1 the larger of two estimates is used,
-  !> from scaled particle theory and from the free volume of a crystal.
+  !> Estimates the mean displacement of a disk in a chain. In equilibrium, Z - 1 equals the mean
+  !> distance between successive disks of a chain along its direction, pi/4 diameters, divided by
+  !> the mean displacement of a disk (Michel, Kapfer and Krauth, 2014, doi:10.1063/1.4863991), where
+  !> Z is the compressibility factor. For Z - 1 the larger of two estimates is used, from scaled
+  !> particle theory and from the free volume of a crystal.
   pure function mean_step(box, radius) result(step)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: radius(:)
@@ -149,10 +150,11 @@ contains
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: first           !! first disk of the chain
     integer, intent(in) :: axis                   !! 1 for x, 2 for y
-    integer, intent(in) :: first_sense            !! 1 to start to the right or upwards, -1 to start in the opposite direction
+    !> 1 to start to the right or upwards, -1 to start in the opposite direction.
+    integer, intent(in) :: first_sense
     real(real64), intent(in) :: length            !! sum of all displacements [length]
-    !> Number of moves between two tests for a jam, without which a chain would never end at closest
-    !> packing, where no disk can move.
+    !> Number of moves between two tests for jamming. Without these tests a chain would never end at
+    !> closest packing, where no disk can move.
     integer, intent(in) :: usual_steps
     real(real64) :: left, left_before, distance   ! [length]
     integer(int32) :: k, partner
@@ -177,8 +179,8 @@ contains
       else
         sense = -sense
         bounces = bounces + 1
-        ! A disk moving between two sides without touching another disk repeats its motion; whole
-        ! periods are skipped.
+        ! A disk that moves back and forth between two sides without touching another disk repeats
+        ! its motion; whole periods are skipped.
         if (bounces == 2) left = modulo(left, max(2*room(packing, k, axis, sense), tiny(left)))
       end if
       step = step + 1
@@ -188,7 +190,7 @@ contains
     end do
   end subroutine move_chain
 
-  !> Distance that disk k can move along a walled axis before it touches a side.
+  !> Distance by which disk k can move along a walled axis before it touches a side.
   pure function room(packing, k, axis, sense) result(distance)
     type(packing_t), intent(in) :: packing
     integer(int32), intent(in) :: k
@@ -201,17 +203,18 @@ contains
       else
         distance = me%x(axis) - me%radius - box%lower(axis)
       end if
-      distance = max(distance, 0.0_real64)        ! rounding errors may have moved the disk slightly beyond the side
+      ! a rounding error may have moved the disk slightly beyond the side
+      distance = max(distance, 0.0_real64)
     end associate
   end function room
 
-  !> Exchanges the positions of two disks of different radii, unless the larger one would overlap
-  !> another disk or a side. The smaller one always fits at the position of the larger one.
+  !> Exchanges the positions of two disks of different radii, unless the larger one would then
+  !> overlap another disk or a side. The smaller one always fits at the position of the larger one.
   pure subroutine try_swap(packing, i, j, swapped)
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: i, j
-    integer(int64), intent(inout) :: swapped(2)   !! numbers of attempted and of accepted swaps
-    real(real64) :: place(2, 2)                   ! positions of the smaller disk and of the larger disk [length]
+    integer(int64), intent(inout) :: swapped(2)   !! numbers of attempted and accepted swaps
+    real(real64) :: place(2, 2)                   ! positions of the smaller and of the larger disk [length]
     integer(int32) :: small, large, blocker
 
     if (.not. abs(packing%disk(i)%radius - packing%disk(j)%radius) > 0) return
@@ -239,10 +242,10 @@ contains
     end associate
   end subroutine try_swap
 
-  !> Permutes positions at random, so that disks of different species are mixed.
+  !> Permutes the positions at random, to mix disks of different species.
   subroutine shuffle(seed, x)
     integer(int64), intent(in) :: seed            !! seed of the run
-    real(real64), intent(inout) :: x(:, :)        !! (2,n) [length]
+    real(real64), intent(inout) :: x(:, :)        !! shape (2, n) [length]
     type(random_stream_t) :: stream
     integer(int32) :: k, other
 

@@ -1,4 +1,4 @@
-!> Placement at the positions that the variable `position` lists.
+!> Placement at the positions given by the variable `position`.
 module explicit_placement
   use fields, only: fields_t
   use kinds, only: int64, real64
@@ -18,7 +18,7 @@ module explicit_placement
       "Positions x1, y1, x2, y2, ... of the disks.", unit="length", goes_with="placement "//word)]
 
   type, extends(placement_t) :: explicit_placement_t
-    real(real64), allocatable :: position(:, :)        !! (2,count) [length]
+    real(real64), allocatable :: position(:, :)        !! shape (2, count) [length]
   contains
     procedure :: read => read_positions
     procedure :: count_disks

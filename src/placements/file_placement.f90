@@ -1,4 +1,4 @@
-!> Placement at positions from an initial-configuration file, which `start/starting_disks` reads.
+!> Placement at positions from an initial-configuration file, read by `start/starting_disks`.
 module file_placement
   use fields, only: fields_t
   use kinds, only: real64
@@ -40,7 +40,7 @@ contains
     yes = .false.
   end function is_bound
 
-  !> The disks are already at the positions from the file.
+  !> Nothing to do: the disks are already at the positions from the file.
   subroutine place(self, batch, packing, line, fields)
     class(file_placement_t), intent(in) :: self
     type(batch_t), intent(inout) :: batch

@@ -1,5 +1,5 @@
-!> Placement on a rectangular grid: the centres of equal cells of the region, row by row from the
-!> bottom.
+!> Placement on a rectangular grid: the disks are at the centres of equal cells of the region, row
+!> by row from the bottom.
 module grid_placement
   use fields, only: fields_t
   use kinds, only: int64, real64

@@ -1,4 +1,4 @@
-!> Placement by compression that starts at positions from an initial-configuration file.
+!> Placement by compression, starting at positions from an initial-configuration file.
 module grown_placement
   use dense_growth, only: smallest_scale
   use dense_placement, only: dense_placement_t

@@ -28,7 +28,7 @@ module lattice_placement
     real(real64) :: edges(2) = 0.0_real64                   !! edges of the rectangle [length]
     logical :: periodic(2) = .false.
     integer :: columns = 0
-    real(real64) :: step(2) = 0.0_real64                    !! distances between columns and between rows [length]
+    real(real64) :: step(2) = 0.0_real64                    !! spacing of columns and of rows [length]
     real(real64) :: distance = 0.0_real64                   !! shortest distance between neighbours [length]
   contains
     procedure :: choose
@@ -51,15 +51,16 @@ contains
   end subroutine place
 
   !> Positions on a triangular lattice, row by row from the bottom. The lattice is stretched along
-  !> one axis to fill the region, with the number of rows for which the distance between neighbours
-  !> is largest. If there are more positions than disks, the last ones remain empty.
+  !> one axis to fill the region; the number of rows is chosen to maximise the distance between
+  !> neighbours. If there are more lattice sites than disks, the last sites remain empty.
   pure subroutine find_lattice(region, box, count, radius, x, misfit)
     real(real64), intent(in) :: region(4)                   !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
     integer, intent(in) :: count                            !! number of disks
     real(real64), intent(in) :: radius                      !! largest radius of the disks [length]
     real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count) [length]
-    character(len=:), allocatable, intent(out) :: misfit    !! reason why the disks do not fit; empty if they fit
+    !> Reason why the disks do not fit; empty if they fit.
+    character(len=:), allocatable, intent(out) :: misfit
     type(lattice_t) :: lattice, other
     real(real64) :: lower(2), upper(2), first(2), closest
     integer :: k, row, fits, more, middle
@@ -80,7 +81,7 @@ contains
     other = lattice
     fits = 0
     more = count
-    do while (more - fits > 1)  ! bisection is possible, because the distance decreases with the number of disks
+    do while (more - fits > 1)  ! bisection, because the distance decreases with the number of disks
       middle = fits + (more - fits)/2
       call other%choose(middle)
       if (other%distance < closest) more = middle
@@ -90,7 +91,8 @@ contains
       //written(lattice%distance)//" apart; up to "//written(fits)//" fit"
   end subroutine find_lattice
 
-  !> Finds the lattice with at least n positions that has the largest distance between neighbours.
+  !> Chooses, among the lattices with at least n sites, the one with the largest distance between
+  !> neighbours.
   pure subroutine choose(self, n)
     class(lattice_t), intent(inout) :: self
     integer, intent(in) :: n
@@ -102,7 +104,8 @@ contains
       ! A periodic lattice must have an even number of rows, because alternate rows are shifted.
       if (self%periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle
       call self%measure(1 + (n - 1)/rows, rows, step, distance)
-      if (rows > 2 .and. 2*step(2) <= self%distance) exit  ! with more rows, the distance between neighbours could only be smaller
+      ! more rows could only reduce the distance between neighbours
+      if (rows > 2 .and. 2*step(2) <= self%distance) exit
       if (distance <= self%distance) cycle
       self%distance = distance
       self%columns = 1 + (n - 1)/rows
@@ -110,7 +113,7 @@ contains
     end do
   end subroutine choose
 
-  !> Lattice spacings between columns and between rows, and the shortest distance between neighbours.
+  !> Spacings of columns and rows of a lattice, and the shortest distance between neighbours.
   pure subroutine measure(self, columns, rows, step, distance)
     class(lattice_t), intent(in) :: self
     integer, intent(in) :: columns, rows

@@ -1,5 +1,5 @@
-!> A placement is a method that generates the initial positions of disks. Each placement is an
-!> extension of the abstract type `placement_t` in a file of this folder.
+!> Methods for generating the initial positions of disks. Each method is an extension of the
+!> abstract type `placement_t`, in a file of this folder.
 module placement
   use disks, only: species_t
   use fields, only: fields_t
@@ -10,15 +10,15 @@ module placement
   private
   public :: batch_t, placement_t
 
-  !> Stages in which species are placed. Species `by_input` come first, in the order of the input.
-  !> Species `by_size` follow, the largest radius first. The last ones are placed `in_batches`, each of
-  !> which may contain several species.
+  !> Stages of the placement. Species `by_input` are placed first, in the order of the input.
+  !> Species `by_size` follow, in the order of decreasing radius. Finally species are placed
+  !> `in_batches`, each of which may contain several species.
   integer, parameter, public :: by_input = 1, by_size = 2, in_batches = 3
-  !> Number that identifies the random streams of placements.
+  !> Key of the random streams of placements.
   integer, parameter, public :: stream_number = 1
 
-  !> Disks that are placed in one call. They belong to one species or, if the placement works
-  !> `in_batches`, to all species with this placement and the same region.
+  !> Disks placed in one call. They belong to one species or, for a placement `in_batches`, to all
+  !> species with this placement and the same region.
   type :: batch_t
     type(species_t), allocatable :: species(:)
     integer(int32) :: number = 0               !! index of the first of these species in the input
@@ -26,11 +26,11 @@ module placement
     integer(int64) :: seed = 0                 !! seed of the run
     real(real64) :: region(4) = 0.0_real64     !! xlo, xhi, ylo, yhi [length]
     real(real64) :: largest_radius = 0.0_real64         !! largest radius of the first species [length]
-    real(real64), allocatable :: radius(:)     !! (n) [length]
-    !> (2,n) positions [length]. Before the placement, these are positions from an initial-configuration file, or
-    !> the shape is (2,0).
+    real(real64), allocatable :: radius(:)     !! radii of the disks [length]
+    !> Positions; shape (2, n) [length]. Before the placement, these are positions from an
+    !> initial-configuration file, or the shape is (2,0).
     real(real64), allocatable :: x(:, :)
-    logical :: is_packed = .false.             !! whether the placement has already added the disks to the packing
+    logical :: is_packed = .false.      !! whether the placement has already added the disks to the packing
   end type batch_t
 
   type, abstract :: placement_t
@@ -55,9 +55,9 @@ module placement
       import :: batch_t, fields_t, packing_t, placement_t, status_line_t
       class(placement_t), intent(in) :: self
       type(batch_t), intent(inout) :: batch
-      type(packing_t), intent(inout) :: packing        !! the disks that have been placed, in their box
-      class(status_line_t), intent(inout) :: line      !! status line that shows the progress
-      class(fields_t), intent(inout) :: fields         !! group of the first species, which receives the problems
+      type(packing_t), intent(inout) :: packing        !! disks placed earlier, in their box
+      class(status_line_t), intent(inout) :: line      !! status line for the progress
+      class(fields_t), intent(inout) :: fields         !! group of the first species; collects the problems
     end subroutine place
   end interface
 
@@ -69,8 +69,8 @@ contains
     class(fields_t), intent(inout) :: fields
   end subroutine read_nothing
 
-  !> Number of disks that follows from a variable of the placement, such as a list of positions, and
-  !> the name of this variable.
+  !> Number of disks implied by a variable of the placement, such as a list of positions, and the
+  !> name of this variable.
   pure subroutine count_disks(self, n, variable)
     class(placement_t), intent(in) :: self
     integer(int64), intent(out) :: n           !! 0 if no variable determines the number
@@ -80,7 +80,7 @@ contains
     variable = ""
   end subroutine count_disks
 
-  !> When a species is placed: `by_input`, `by_size` or `in_batches`.
+  !> Stage in which a species is placed: `by_input`, `by_size` or `in_batches`.
   pure function turn(self)
     class(placement_t), intent(in) :: self
     integer :: turn
@@ -88,7 +88,7 @@ contains
     turn = by_input
   end function turn
 
-  !> Name of the variable with which the position of a disk can be corrected.
+  !> Name of the variable with which the user can correct the position of a disk.
   pure function culprit(self) result(name)
     class(placement_t), intent(in) :: self
     character(len=:), allocatable :: name
@@ -96,7 +96,7 @@ contains
     name = "placement"
   end function culprit
 
-  !> Whether the placement itself keeps the disks in their region. Positions given in the input may
+  !> True if the placement itself keeps the disks in their region. Positions given in the input may
   !> be anywhere.
   pure function is_bound(self) result(yes)
     class(placement_t), intent(in) :: self
@@ -105,8 +105,7 @@ contains
     yes = .true.
   end function is_bound
 
-  !> The part of a message that says why the placement cannot reach a packing fraction; empty if it
-  !> can.
+  !> Explains in a message why the placement cannot reach a packing fraction; empty if it can.
   pure function shortfall(self, packing_fraction) result(text)
     class(placement_t), intent(in) :: self
     real(real64), intent(in) :: packing_fraction
@@ -115,8 +114,8 @@ contains
     text = ""
   end function shortfall
 
-  !> Fraction of the full radius to which disks are shrunk for the test of positions from an
-  !> initial-configuration file: shrunk disks must not overlap.
+  !> Factor by which disks are shrunk when positions from an initial-configuration file are tested:
+  !> the shrunk disks must not overlap.
   pure function starting_scale(self) result(scale)
     class(placement_t), intent(in) :: self
     real(real64) :: scale
@@ -124,7 +123,7 @@ contains
     scale = 1
   end function starting_scale
 
-  !> Whether the placement moves all disks of the run. All species must then have this placement and
+  !> True if the placement moves all disks of the run. All species must then have this placement and
   !> the whole box as their region. The option --check skips such a placement, because it may take
   !> long.
   pure function moves_all_disks(self) result(yes)
@@ -134,8 +133,8 @@ contains
     yes = .false.
   end function moves_all_disks
 
-  !> The part of a message that says why a group or variable cannot be combined with the placement;
-  !> empty if it can.
+  !> Explains in a message why a group or variable cannot be combined with the placement; empty if
+  !> it can.
   pure function conflict(self, variable) result(reason)
     class(placement_t), intent(in) :: self
     character(len=*), intent(in) :: variable
@@ -144,11 +143,12 @@ contains
     reason = ""
   end function conflict
 
-  !> Memory per disk during the placement, without optional data. [bytes]
+  !> Memory during the placement in bytes per disk, without optional data.
   pure function bytes(self, own_sizes, periods) result(number)
     class(placement_t), intent(in) :: self
-    logical, intent(in) :: own_sizes           !! whether masses or radii within a species differ
-    real(real64), intent(in) :: periods        !! memory for the image counters of a disk; 0 if the box is not periodic [bytes]
+    logical, intent(in) :: own_sizes           !! whether masses or radii differ within a species
+    !> Memory for the image counters of a disk; 0 if the box is not periodic [bytes].
+    real(real64), intent(in) :: periods
     real(real64) :: number
 
     number = 150

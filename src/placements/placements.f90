@@ -1,5 +1,6 @@
-!> The placements: their keywords in the input, their types, and their variables in the group
-!> `&species`. A new placement is a file of this folder, and a line in each list of this module.
+!> List of all placements: their keywords in the input, their types, and their variables in the
+!> group `&species`. A new placement requires a file in this folder and a line in each list of this
+!> module.
 module placements
   use dense_placement, only: dense_placement_t, dense_choices => choices, dense_word => word
   use explicit_placement, only: explicit_placement_t, explicit_choices => choices, explicit_rows => rows, explicit_word => word
@@ -16,12 +17,12 @@ module placements
   private
   public :: choose_placement, common_variable, placement_choices, placement_rows
 
-  !> Keywords of the placements, separated by blanks: all of them, and those that start at positions
-  !> from an initial-configuration file.
+  !> Keywords of the placements, separated by blanks: all placements, and those that start at
+  !> positions from an initial-configuration file.
   character(len=*), parameter :: words = random_word//" "//grid_word//" "//lattice_word//" "//dense_word//" "//explicit_word &
     //" "//file_word//" "//grown_word//" "//relaxed_word
   character(len=*), parameter :: with_file = file_word//" "//grown_word
-  !> Variable that must have the same value for all species.
+  !> Variable that must be equal for all species.
   character(len=*), parameter :: common_variable = relaxed_sweeps
 
   type(choice_t), parameter :: placement_choices(*) = [ &
@@ -46,7 +47,8 @@ module placements
 
 contains
 
-  !> Creates a placement. For an invalid word, which has been reported, it is the default.
+  !> Creates the placement for a keyword. An invalid keyword, which has been reported, gives the
+  !> default.
   subroutine choose_placement(word, placement)
     character(len=*), intent(in) :: word
     class(placement_t), allocatable, intent(out) :: placement

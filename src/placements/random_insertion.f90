@@ -1,14 +1,14 @@
-!> Random sequential insertion: each disk is inserted at a point uniformly distributed over all
-!> points where it fits between the previous disks. The region is divided into small rectangles
-!> called voxels. A voxel is eliminated if a single disk excludes the centre of a new disk from all
-!> of it. Points are drawn only from the remaining voxels, which are halved along both axes when
-!> attempts fail too often. Since attempts in eliminated voxels would always fail, the distribution
-!> is that of simple insertion, but saturation can be reached (Zhang and Torquato, 2013,
-!> doi:10.1103/PhysRevE.88.053312).
+!> Random sequential insertion: each disk is inserted at a random point, drawn uniformly from all
+!> points where it fits between the disks inserted earlier. The region is divided into small
+!> rectangles called voxels. A voxel is eliminated if a single disk prevents the centre of a new
+!> disk from lying anywhere in it. Points are drawn only from the remaining voxels, which are halved
+!> along both axes when attempts fail too often. Attempts in eliminated voxels would always fail;
+!> the distribution is therefore that of simple insertion, but saturation can be reached (Zhang and
+!> Torquato, 2013, doi:10.1103/PhysRevE.88.053312).
 !>
-!> Disks of different radii are inserted in order of decreasing radius. No voxels are then
-!> eliminated, because a voxel without space for one disk may have space for a smaller one, and the
-!> insertion ends after many failed attempts.
+!> Disks of different radii are inserted in the order of decreasing radius. In this case no voxels
+!> are eliminated, because a voxel without space for one disk may have space for a smaller one, and
+!> the insertion ends after many failed attempts.
 module random_insertion
   use kinds, only: int32, real64
   use memory_hints, only: prefetch
@@ -20,19 +20,23 @@ module random_insertion
   private
   public :: insert_at_random, largest_first
 
-  integer(int32), parameter :: disks_per_look = 1024    !! number of disks between two updates of the status line
-  integer(int32), parameter :: drawn_ahead = 8          !! number of attempts whose random numbers are drawn in advance
-  integer(int32), parameter :: most_attempts = 300000   !! largest number of attempts for one disk, if the radii differ
+  !> Number of disks between two updates of the status line.
+  integer(int32), parameter :: disks_per_look = 1024
+  !> Number of attempts whose random numbers are drawn in advance.
+  integer(int32), parameter :: drawn_ahead = 8
+  !> Maximum number of attempts for one disk if the radii differ.
+  integer(int32), parameter :: most_attempts = 300000
 
-  !> The remaining voxels, in which the centre of another disk may fit.
+  !> Remaining voxels, in which the centre of another disk may fit.
   type :: voxels_t
     real(real64) :: origin(2) = 0.0_real64          !! [length]
     real(real64) :: side(2) = 0.0_real64            !! [length]
     integer(int32) :: n = 0                         !! number of remaining voxels
-    integer(int32), allocatable :: column_row(:, :) !! (2,n) column and row of each voxel, starting at 0
+    !> Column and row of each voxel, starting at 0; shape (2, n)
+    integer(int32), allocatable :: column_row(:, :)
   end type voxels_t
 
-  !> Random numbers of an attempt, and the state of the random stream after them.
+  !> Random numbers of an attempt, and the subsequent state of the random stream.
   type :: attempt_t
     real(real64) :: voxel = 0.0_real64              !! random number in [0, 1) that selects the voxel
     real(real64) :: place(2) = 0.0_real64           !! position in the voxel, as fractions of its edges
@@ -41,21 +45,22 @@ module random_insertion
 
 contains
 
-  !> Inserts the disks of a species, beginning with disk `first`, until all are placed or no space
-  !> is left.
+  !> Inserts the disks of a species from disk `first` on, until all are placed or no space is left.
   subroutine insert_at_random(packing, s, first, size_of, stream, line, placed)
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: s                 !! index of a species for which `open_species` was called
     integer(int32), intent(in) :: first
-    real(real64), intent(in) :: size_of(:)          !! (count) radii of the disks [length]
+    real(real64), intent(in) :: size_of(:)          !! radius of each disk [length]
     type(random_stream_t), intent(inout) :: stream
-    class(status_line_t), intent(inout) :: line     !! status line that shows the progress of the insertion
+    class(status_line_t), intent(inout) :: line     !! status line for the progress
     integer(int32), intent(out) :: placed           !! number of disks inserted
     type(voxels_t) :: voxels
     integer(int32) :: i, j, k, n(2), blocker, failures, count, order(size(size_of))
     integer(int32) :: attempts                      ! number of attempts made, modulo `drawn_ahead`
-    type(attempt_t) :: coming(0:drawn_ahead - 1)    ! the next attempts, drawn early so that their data can be prefetched
-    type(random_stream_t) :: last                   ! state of the random stream after the last attempt that was made
+    ! the next attempts, drawn early so that their data can be prefetched
+    type(attempt_t) :: coming(0:drawn_ahead - 1)
+    ! state of the random stream after the latest attempt
+    type(random_stream_t) :: last
     real(real64) :: p(2), radius, lower(2), upper(2)
     logical :: equal
 
@@ -104,7 +109,7 @@ contains
       if (failures == most_attempts .and. .not. equal) exit
       if (.not. equal) cycle
       if (packing%covers(blocker, middle(voxels, k), 0.5_real64*voxels%side, radius)) then
-        voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last voxel replaces the eliminated voxel
+        voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last voxel fills the gap
         voxels%n = voxels%n - 1
       end if
       ! Dividing the voxels pays off only after about twice as many failed attempts as there are
@@ -119,7 +124,7 @@ contains
 
   contains
 
-    !> The point at which an attempt places the centre of the new disk.
+    !> Point where an attempt places the centre of the new disk.
     pure function place(attempt) result(p)
       type(attempt_t), intent(in) :: attempt
       real(real64) :: p(2)
@@ -128,7 +133,7 @@ contains
     end function place
 
     !> Prefetches data for future attempts: the voxel of the attempt drawn last, and the cells and
-    !> disks near the points of two earlier ones. Consecutive attempts access distant parts of the
+    !> disks near the points of two earlier ones. Consecutive attempts access distant parts of
     !> memory, so this saves time if the data exceed the cache.
     subroutine load_ahead()
       associate (far => coming(modulo(attempts - 1, drawn_ahead)), near => coming(modulo(attempts + 3, drawn_ahead)), &
@@ -151,8 +156,7 @@ contains
     attempt%after = stream
   end subroutine draw_attempt
 
-  !> Index of the voxel that an attempt selects, calculated from its random number by the formula of
-  !> `draw_index`.
+  !> Index of the voxel selected by an attempt, from its random number, as in `draw_index`.
   pure function chosen(voxels, attempt) result(k)
     type(voxels_t), intent(in) :: voxels
     type(attempt_t), intent(in) :: attempt
@@ -161,8 +165,8 @@ contains
     k = 1 + int(voxels%n*attempt%voxel, int32)
   end function chosen
 
-  !> Order of decreasing radius with a resolution of a thousandth of the range of radii, within
-  !> which disks keep their original order.
+  !> Permutation that sorts the disks by decreasing radius. Radii are compared with a resolution of
+  !> a thousandth of their range; within this resolution disks keep their original order.
   pure function largest_first(radius) result(order)
     real(real64), intent(in) :: radius(:)           !! [length]
     integer(int32), parameter :: classes = 1000
@@ -173,7 +177,7 @@ contains
       classes + 1, first, order)
   end function largest_first
 
-  !> The centre of voxel k.
+  !> Centre of voxel k.
   pure function middle(voxels, k) result(p)
     type(voxels_t), intent(in) :: voxels
     integer(int32), intent(in) :: k
@@ -182,8 +186,8 @@ contains
     p = voxels%origin + (voxels%column_row(:, k) + 0.5_real64)*voxels%side
   end function middle
 
-  !> Divides each voxel into four, and removes those new voxels that a single disk or obstacle
-  !> excludes completely.
+  !> Divides each voxel into four and eliminates new voxels that are excluded completely by a single
+  !> disk or obstacle.
   pure subroutine halve(voxels, packing, radius)
     type(voxels_t), intent(inout) :: voxels
     type(packing_t), intent(in) :: packing
@@ -193,7 +197,8 @@ contains
 
     n = voxels%n
     if (maxval(voxels%column_row(:, :n)) >= ishft(huge(n), -1)) then
-      voxels%n = 0                                  ! the numbers of columns and rows of smaller voxels would exceed 32 bits
+      ! the numbers of columns and rows of smaller voxels would exceed 32 bits
+      voxels%n = 0
       return
     end if
     call move_alloc(voxels%column_row, parent)

@@ -1,4 +1,4 @@
-!> Placement by random sequential insertion, see `random_insertion`.
+!> Placement by random sequential insertion (see `random_insertion`).
 module random_placement
   use box_sides, only: centre_range
   use fields, only: fields_t
@@ -19,15 +19,16 @@ module random_placement
     choice_t("placement", word, "Random sequential insertion: uniformly distributed positions without overlaps, up to a " &
       //"packing fraction of about 0.54.")]
 
-  !> Limit of the number of attempts to place a species times the number of its disks.
+  !> Maximum of the number of attempts to place a species times the number of its disks.
   integer(int32), parameter :: many_trials = 500000
-  !> After an attempt that has placed n disks, a new attempt is expected to place at most nearly*n +
-  !> few.
+  !> Additive constant of the estimate that if one attempt placed n disks, another will place at
+  !> most nearly*n + few.
   integer(int32), parameter :: few = 5
-  real(real64), parameter :: nearly = 1.25_real64  !! factor of n in the estimate nearly*n + few
-  !> Smallest ratio of the packing fractions that 'dense' and 'random' placement can reach
+  real(real64), parameter :: nearly = 1.25_real64  !! factor of n in this estimate
+  !> Minimum ratio of the packing fractions reached by 'dense' and by 'random' placement.
   real(real64), parameter :: denser = 1.5_real64
-  real(real64), parameter :: saturation = 0.547_real64  !! packing fraction at which random sequential insertion saturates
+  !> Packing fraction at which random sequential insertion saturates.
+  real(real64), parameter :: saturation = 0.547_real64
 
   type, extends(placement_t) :: random_placement_t
   contains
@@ -71,24 +72,25 @@ contains
     count = size(batch%radius, kind=int32)
     call stream%seed(batch%seed, [int(batch%number), stream_number])
     call centre_range(batch%region, packing%box, batch%largest_radius, lower, upper)
-    ! The number of disks that fit varies between attempts. A species with few disks is tried more
+    ! The number of disks that fit varies between attempts. A species of few disks is tried more
     ! often, because the relative variation is larger.
     do trial = 1, merge(1, max(1, many_trials/count), minval(batch%radius) < maxval(batch%radius))
       call packing%open_species(batch%number, batch%largest_radius, count, lower, upper)
       call insert_at_random(packing, batch%number, batch%first, batch%radius, stream, line, placed)
       batch%is_packed = placed == count
       if (batch%is_packed) return
-      if (placed == 0 .or. count > nearly*placed + few) exit  ! a new attempt is unlikely to place all disks
+      if (placed == 0 .or. count > nearly*placed + few) exit  ! another attempt is unlikely to place all disks
     end do
     call fields%complain("placement", failure(batch, placed))
   end subroutine place
 
-  !> Message about disks for which there was no room.
+  !> Message about disks that could not be placed.
   pure function failure(batch, placed) result(text)
     type(batch_t), intent(in) :: batch
-    integer(int32), intent(in) :: placed       !! number of disks that were placed
+    integer(int32), intent(in) :: placed       !! number of disks placed
     character(len=:), allocatable :: text
-    real(real64), allocatable :: part(:)       ! area of each disk divided by that of the region, in the order of placement
+    ! area of each disk divided by that of the region, in the order of placement
+    real(real64), allocatable :: part(:)
 
     allocate (part(size(batch%radius)))
     part = pi*batch%radius(largest_first(batch%radius))**2/product(batch%region([2, 4]) - batch%region([1, 3]))

@@ -1,5 +1,5 @@
 !> Placement in equilibrium: the disks of all species are placed together, by compression or on a
-!> lattice, and equilibrated by event chains (see `event_chains`).
+!> lattice, and then equilibrated by event chains (see `event_chains`).
 module relaxed_placement
   use box_geometry, only: box_t
   use dense_placement, only: dense_placement_t, growth_box
@@ -27,10 +27,10 @@ module relaxed_placement
       //"species and may be given in the group of any of them.", &
       number_of_sweeps, goes_with="placement "//word)]
 
-  !> Packing fraction of freezing, above which the fluid is not stable (Engel et al., 2013,
-  !> doi:10.1103/PhysRevE.87.042134). Denser disks of equal radii start on a lattice, if it fits
-  !> into the box. A compressed fluid would become a polycrystal, which event chains equilibrate
-  !> only slowly.
+  !> Packing fraction of freezing, above which the fluid is unstable (Engel et al., 2013,
+  !> doi:10.1103/PhysRevE.87.042134). Denser disks of equal radii start on a lattice if it fits into
+  !> the box. A compressed fluid would become a polycrystal, which event chains equilibrate only
+  !> slowly.
   real(real64), parameter :: freezing = 0.70_real64
 
   type, extends(dense_placement_t) :: relaxed_placement_t
@@ -91,13 +91,13 @@ contains
 
     call place_on_lattice(batch, packing)
     if (size(batch%x, 2) == 0) call self%dense_placement_t%place(batch, packing, line, fields)
-    if (size(batch%x, 2) == 0) return          ! `dense_placement` has reported the reason
+    if (size(batch%x, 2) == 0) return          ! reported by `dense_placement`
     box = growth_box(packing, batch%region)
     call relax(box, batch%radius, batch%seed, self%sweeps, line, batch%x)
   end subroutine place
 
-  !> Places the disks on a lattice, in random order, if they have equal radii and a packing fraction
-  !> above that of freezing, and if the lattice fits into the box. Otherwise there are no positions.
+  !> Places the disks on a lattice in random order, if they have equal radii, a packing fraction
+  !> above freezing, and a box into which the lattice fits. Otherwise no positions are returned.
   subroutine place_on_lattice(batch, packing)
     type(batch_t), intent(inout) :: batch
     type(packing_t), intent(in) :: packing
