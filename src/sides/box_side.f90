@@ -1,4 +1,4 @@
-!> A side of the box: its motion, and the state of a piston.
+!> A side of the box, with its motion and the state of a piston.
 module box_side
   use kinds, only: never, real64
   use side_motion, only: side_motion_t, side_state_t
@@ -8,8 +8,9 @@ module box_side
   public :: side_t
 
   type :: side_t
-    class(side_motion_t), allocatable :: motion      !! not allocated if the side stands still at the edge of the box
-    type(side_state_t) :: state                      !! state of a piston
+    !> Not allocated if the side is at rest at the edge of the box.
+    class(side_motion_t), allocatable :: motion
+    type(side_state_t) :: state                      !! state of the side if it is a piston
   contains
     procedure :: moves
     procedure :: is_piston
@@ -27,7 +28,7 @@ module box_side
 
 contains
 
-  !> Whether the side is ever away from the edge of the box.
+  !> True if the side is ever away from the edge of the box.
   elemental function moves(self) result(yes)
     class(side_t), intent(in) :: self
     logical :: yes
@@ -36,7 +37,7 @@ contains
     if (yes) yes = self%motion%moves()
   end function moves
 
-  !> Whether the side is a piston, which collisions with disks move.
+  !> True if the side is a piston, moved by collisions with disks.
   elemental function is_piston(self) result(yes)
     class(side_t), intent(in) :: self
     logical :: yes
@@ -45,7 +46,7 @@ contains
     if (yes) yes = self%motion%is_piston()
   end function is_piston
 
-  !> Whether the side moves by a fixed length that is known beforehand.
+  !> True if the side moves by a fixed length known in advance.
   elemental function has_stroke(self) result(yes)
     class(side_t), intent(in) :: self
     logical :: yes
@@ -54,7 +55,7 @@ contains
     if (yes) yes = self%motion%final_time() < never
   end function has_stroke
 
-  !> Whether the position of the side changes permanently.
+  !> True if the position of the side changes permanently.
   elemental function moves_permanently(self) result(yes)
     class(side_t), intent(in) :: self
     logical :: yes
@@ -63,7 +64,7 @@ contains
     if (yes) yes = self%motion%moves_permanently()
   end function moves_permanently
 
-  !> Displacement of the side inwards at the start of its motion.
+  !> Inward displacement of the side when its motion starts.
   elemental function offset(self) result(x)
     class(side_t), intent(in) :: self
     real(real64) :: x                                !! [length]
@@ -72,7 +73,7 @@ contains
     if (allocated(self%motion)) x = self%motion%offset
   end function offset
 
-  !> Largest displacement of the side known beforehand, inwards or outwards.
+  !> Maximum displacement of the side in either direction, as far as it is known in advance.
   elemental function reach(self) result(x)
     class(side_t), intent(in) :: self
     real(real64) :: x                                !! [length]
@@ -81,7 +82,7 @@ contains
     if (allocated(self%motion)) x = self%motion%reach
   end function reach
 
-  !> Largest displacement of the side inwards, see `side_motion`.
+  !> Maximum inward displacement of the side; see `side_motion`.
   elemental function innermost_position(self) result(x)
     class(side_t), intent(in) :: self
     real(real64) :: x                                !! [length]
@@ -90,7 +91,7 @@ contains
     if (allocated(self%motion)) x = self%motion%innermost_position()
   end function innermost_position
 
-  !> Highest speed of the side, see `side_motion`.
+  !> Maximum speed of the side; see `side_motion`.
   elemental function highest_speed(self) result(speed)
     class(side_t), intent(in) :: self
     real(real64) :: speed                            !! [length/time]
@@ -99,7 +100,7 @@ contains
     if (allocated(self%motion)) speed = self%motion%highest_speed()
   end function highest_speed
 
-  !> Displacement of the side inwards at a given time.
+  !> Inward displacement of the side at a given time.
   elemental function position(self, epoch, t) result(x)
     class(side_t), intent(in) :: self
     real(real64), intent(in) :: epoch                !! time origin [time]
@@ -110,7 +111,7 @@ contains
     if (allocated(self%motion)) x = self%motion%position(self%motion%local_time(epoch, t, self%state), self%state)
   end function position
 
-  !> Velocity of the side inwards at a given time.
+  !> Inward velocity of the side at a given time.
   elemental function velocity(self, epoch, t) result(v)
     class(side_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! as in `position`
@@ -120,11 +121,11 @@ contains
     if (allocated(self%motion)) v = self%motion%velocity(self%motion%local_time(epoch, t, self%state), self%state)
   end function velocity
 
-  !> Sets the displacement of the side at the start of its motion. A side at rest beside the edge of the box is a stroke with zero
-  !> velocity.
+  !> Sets the displacement of the side at the start of its motion. A side at rest away from the edge
+  !> of the box is a stroke of zero velocity.
   elemental subroutine place(self, offset)
     class(side_t), intent(inout) :: self
-    real(real64), intent(in) :: offset               !! displacement inwards [length]
+    real(real64), intent(in) :: offset               !! inward displacement [length]
 
     if (.not. allocated(self%motion)) then
       if (.not. abs(offset) > 0) return
@@ -133,7 +134,7 @@ contains
     call self%motion%place(offset)
   end subroutine place
 
-  !> Lets the side begin a motion at its position before a change; an unchanged motion continues.
+  !> Starts a new motion of the side at its position before a change. An unchanged motion continues.
   elemental subroutine follow(self, before, epoch, t)
     class(side_t), intent(inout) :: self
     type(side_t), intent(in) :: before
@@ -148,7 +149,7 @@ contains
     end if
   end subroutine follow
 
-  !> Whether a side continues the motion that it had before a change.
+  !> True if the side continues its motion of before a change.
   elemental function continues(after, before) result(yes)
     type(side_t), intent(in) :: after, before
     logical :: yes

@@ -1,5 +1,6 @@
-!> The kinds of motion of a side: their words in the input, their types, and the variables of the motion in the group `&side`. To
-!> add a kind of motion, add a file to this folder and a line to each list of this module.
+!> List of all motions of a side: their keywords in the input, their types, and their variables in
+!> the group `&side`. A new motion requires a file in this folder and a line in each list of this
+!> module.
 module motions
   use parabolic, only: parabolic_t, parabolic_choices => choices, parabolic_word => word
   use piston, only: piston_t, piston_choices => choices, piston_rows => rows, piston_word => word
@@ -13,8 +14,8 @@ module motions
   public :: choose_motion, motion_choices, motion_rows, pistons
 
   character(len=*), parameter :: still_word = "still"
-  !> Words for the kinds of motion, separated by blanks: oscillations, motions with a `position`,
-  !> motions with a `velocity`, all kinds, and pistons.
+  !> Keywords of the motions, separated by blanks: oscillations, motions with a `position`, motions
+  !> with a `velocity`, all motions, and pistons.
   character(len=*), parameter :: oscillations = sine_word//" "//parabolic_word
   character(len=*), parameter :: with_position = still_word//" "//stroke_word//" "//piston_word
   character(len=*), parameter :: with_velocity = sawtooth_word//" "//stroke_word
@@ -51,7 +52,7 @@ module motions
 
 contains
 
-  !> Creates the motion of a kind; for the word 'still' the result is not allocated.
+  !> Creates the motion for a keyword; for 'still' the result is not allocated.
   subroutine choose_motion(word, motion)
     character(len=*), intent(in) :: word
     class(side_motion_t), allocatable, intent(out) :: motion
@@ -67,7 +68,7 @@ contains
       allocate (stroke_t :: motion)
     case (piston_word)
       allocate (piston_t :: motion)
-    case default                                     ! the side stands still
+    case default                                     ! the side is at rest
     end select
   end subroutine choose_motion
 

@@ -1,8 +1,9 @@
 !> Oscillations of a side about its mean position.
 !>
-!> While the acceleration of a disk relative to the side keeps its sign, the gap between the two is a convex or concave function of
-!> time, whose first zero can be enclosed in an interval without other zeros. A period of the motion consists of a few such
-!> intervals. No contact can therefore be missed, even if side and disk stay close together for a long time.
+!> As long as the acceleration of a disk relative to the side keeps its sign, the gap between them
+!> is a convex or concave function of time, whose first zero can be bracketed. A period of the
+!> oscillation consists of a few such intervals. Therefore no contact can be missed, even if side
+!> and disk stay close together for a long time.
 module oscillation
   use fields, only: fields_t
   use free_flight, only: flight, flight_velocity, time_to_line
@@ -14,14 +15,14 @@ module oscillation
   private
   public :: gap_after, negligible, oscillation_t
 
-  !> Length of a negligible time interval, as a fraction of the period: an acceleration that lasts no longer changes the gap by less
-  !> than its rounding error.
+  !> Duration of a negligible time interval, as a fraction of the period. An acceleration that lasts
+  !> no longer changes the gap by less than its rounding error.
   real(real64), parameter :: negligible = 1.0e-10_real64
-  !> Number of successive intervals from `curvature_interval` that together cover at least one period of the motion, even if some of
-  !> them are negligibly short.
+  !> Number of successive intervals from `curvature_interval` that cover at least one period of the
+  !> motion, even if some of them are negligibly short.
   integer, parameter :: intervals_in_reach = 6
 
-  !> An oscillation with the amplitude `reach`.
+  !> An oscillation of amplitude `reach`.
   type, abstract, extends(side_motion_t) :: oscillation_t
     real(real64) :: period = 1.0_real64              !! [time]
     real(real64) :: phase = 0.0_real64               !! phase at t = 0, in units of the period
@@ -47,7 +48,7 @@ module oscillation
 
   abstract interface
 
-    !> Displacement inwards [length], velocity, or acceleration just after a time.
+    !> Inward displacement [length], velocity or acceleration, just after a given time.
     elemental function value_in_period(self, tau) result(x)
       import :: oscillation_t, real64
       class(oscillation_t), intent(in) :: self
@@ -55,8 +56,9 @@ module oscillation
       real(real64) :: x
     end function value_in_period
 
-    !> Displacement of the side between the times tau and tau + s, its change of velocity, or its displacement relative to uniform
-    !> motion at the velocity at tau. The latter is calculated without cancellation between two displacements.
+    !> Displacement of the side between the times tau and tau + s, its change of velocity, or its
+    !> displacement relative to uniform motion with the velocity at tau. The latter is calculated
+    !> without subtracting two nearly equal displacements.
     elemental function change_between(self, tau, s) result(x)
       import :: oscillation_t, real64
       class(oscillation_t), intent(in) :: self
@@ -64,7 +66,7 @@ module oscillation
       real(real64) :: x
     end function change_between
 
-    !> Whether the duration s is so short that the formula of `excess_displacement` is valid.
+    !> True if the duration s is short enough for the formula of `excess_displacement`.
     elemental function is_short(self, tau, s) result(yes)
       import :: oscillation_t, real64
       class(oscillation_t), intent(in) :: self
@@ -72,13 +74,14 @@ module oscillation
       logical :: yes
     end function is_short
 
-    !> Duration of the longest interval from the time tau in which the gap to a disk with the acceleration g is a convex or concave
-    !> function of time. It ends when the acceleration of the side equals g or, at the latest, after half a period.
+    !> Duration of the longest interval from the time tau on during which the gap to a disk of
+    !> acceleration g is a convex or a concave function of time. It ends when the acceleration of
+    !> the side equals g, or after half a period.
     elemental function curvature_interval(self, tau, g) result(s)
       import :: oscillation_t, real64
       class(oscillation_t), intent(in) :: self
       real(real64), intent(in) :: tau                !! time as returned by `local_time` [time]
-      real(real64), intent(in) :: g                  !! [length/time**2]
+      real(real64), intent(in) :: g                  !! acceleration of the disk [length/time**2]
       real(real64) :: s                              !! [time]
     end function curvature_interval
   end interface
@@ -89,7 +92,7 @@ contains
   subroutine read_oscillation(self, fields, width)
     class(oscillation_t), intent(inout) :: self
     class(fields_t), intent(inout) :: fields
-    real(real64), intent(in) :: width                !! not used
+    real(real64), intent(in) :: width                !! unused
 
     call fields%read("amplitude", self%reach)
     call fields%read("period", self%period)
@@ -113,7 +116,7 @@ contains
     name = "amplitude"
   end function culprit
 
-  !> The amplitude.
+  !> Amplitude of the oscillation.
   elemental function innermost_position(self) result(x)
     class(oscillation_t), intent(in) :: self
     real(real64) :: x                                !! [length]
@@ -121,8 +124,8 @@ contains
     x = self%reach
   end function innermost_position
 
-  !> Time since the start of the present period. Remainders modulo the period are exact, so that late times are as precise as early
-  !> ones.
+  !> Time since the start of the present period. Remainders modulo the period are exact, so that
+  !> late times are as precise as early ones.
   elemental function local_time(self, epoch, t, state) result(tau)
     class(oscillation_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
@@ -132,7 +135,7 @@ contains
     tau = modulo(modulo(epoch, self%period) + modulo(t, self%period) + self%phase*self%period, self%period)
   end function local_time
 
-  !> Displacement of the side inwards from its mean position.
+  !> Inward displacement of the side from its mean position.
   elemental function position(self, tau, state) result(x)
     class(oscillation_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -142,7 +145,7 @@ contains
     x = self%displaced_by(tau)
   end function position
 
-  !> Velocity of the side inwards.
+  !> Inward velocity of the side.
   elemental function velocity(self, tau, state) result(x)
     class(oscillation_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -152,9 +155,9 @@ contains
     x = self%velocity_at(tau)
   end function velocity
 
-  !> Time until the side touches a disk. A disk that stays within the range of motion of the side for a whole period is touched,
-  !> unless it is slow and at the very end of the range. After a period without contact, the search therefore skips an increasing
-  !> number of periods.
+  !> Time until the side touches a disk. A disk that stays within the range of the oscillation for a
+  !> whole period is touched, unless it is slow and at the very end of this range. After each period
+  !> without contact, the search therefore skips an increasing number of periods.
   pure function contact_time(self, tau, gap, v, g, state) result(s)
     class(oscillation_t), intent(in) :: self
     real(real64), intent(in) :: tau, gap, v, g       !! see `side_motion`
@@ -162,8 +165,9 @@ contains
     real(real64) :: s, from, to, above, entry
     integer :: intervals
 
-    above = gap + self%displaced_by(tau) - self%reach  ! distance of the disk from the range of motion of the side
-    entry = time_to_line(above, -v, -g)  ! time at which the disk enters the range of motion of the side for the last time
+    ! distance of the disk from the range of the oscillation
+    above = gap + self%displaced_by(tau) - self%reach
+    entry = time_to_line(above, -v, -g)  ! time at which the disk enters this range for the last time
     s = never
     from = 0
     intervals = 0
@@ -186,12 +190,14 @@ contains
     end do
   end function contact_time
 
-  !> Time of contact within an interval in which the gap is convex or concave; the result is `never` if there is no contact.
+  !> Time of contact in an interval in which the gap, as a function of time, is convex or concave;
+  !> `never` if there is no contact.
   pure function first_contact(self, tau, gap, disk, from, to) result(s)
     class(oscillation_t), intent(in) :: self
     real(real64), intent(in) :: tau, gap             !! as in `contact_time`
-    real(real64), intent(in) :: disk(2)              !! velocity and acceleration of the disk [length/time, length/time**2]
-    real(real64), intent(in) :: from, to             !! the interval [time]
+    !> Velocity [length/time] and acceleration [length/time**2] of the disk.
+    real(real64), intent(in) :: disk(2)
+    real(real64), intent(in) :: from, to             !! start and end of the interval [time]
     real(real64) :: s, curvature, low, high, relative
 
     relative = disk(1) - self%velocity_at(tau)
@@ -200,7 +206,7 @@ contains
     if (.not. gap_at(from) > 0 .and. gap_rate(from) < 0) return
     s = never
     high = to
-    if (curvature > 0) then                          ! the gap is smallest when its rate of change is 0
+    if (curvature > 0) then                          ! the gap has its minimum where its rate of change is 0
       if (.not. gap_rate(from) < 0) return
       low = from
       if (gap_rate(to) > 0) call bisect(.true., low, high)
@@ -212,7 +218,7 @@ contains
 
   contains
 
-    !> Gap between side and disk after the time t.
+    !> Gap between side and disk at the time tau + t.
     pure function gap_at(t) result(distance)
       real(real64), intent(in) :: t
       real(real64) :: distance
@@ -220,7 +226,7 @@ contains
       distance = gap_after(self, tau, gap, disk, t)
     end function gap_at
 
-    !> Rate of change of the gap between side and disk after the time t.
+    !> Rate of change of the gap between side and disk at the time tau + t.
     pure function gap_rate(t) result(speed)
       real(real64), intent(in) :: t
       real(real64) :: speed
@@ -228,8 +234,8 @@ contains
       speed = relative + (disk(2)*t - self%velocity_change(tau, t))
     end function gap_rate
 
-    !> Bisects an interval until `left` and `right` are adjacent floating-point numbers. At the time `right` the gap increases if
-    !> `to_smallest` is .true., and is negative otherwise.
+    !> Bisects an interval until `left` and `right` are adjacent floating-point numbers. At the time
+    !> `right` the gap increases if `to_smallest` is .true., and is negative otherwise.
     pure subroutine bisect(to_smallest, left, right)
       logical, intent(in) :: to_smallest
       real(real64), intent(inout) :: left, right
@@ -250,11 +256,12 @@ contains
     end subroutine bisect
   end function first_contact
 
-  !> Gap between side and disk after the time t.
+  !> Gap between side and disk at the time tau + t.
   pure function gap_after(self, tau, gap, disk, t) result(distance)
     class(oscillation_t), intent(in) :: self
     real(real64), intent(in) :: tau, gap             !! as in `contact_time`
-    real(real64), intent(in) :: disk(2)              !! velocity and acceleration of the disk [length/time, length/time**2]
+    !> Velocity [length/time] and acceleration [length/time**2] of the disk.
+    real(real64), intent(in) :: disk(2)
     real(real64), intent(in) :: t                    !! [time]
     real(real64) :: distance                         !! [length]
 

@@ -1,4 +1,4 @@
-!> Oscillation of a side with piecewise constant acceleration: a series of parabolas, close to a sine.
+!> Oscillation with piecewise constant acceleration: a series of parabolas that resembles a sine.
 module parabolic
   use free_flight, only: time_to_line
   use kinds, only: never, real64
@@ -29,7 +29,7 @@ module parabolic
 
 contains
 
-  !> Highest speed of the side.
+  !> Maximum speed of the side.
   elemental function highest_speed(self) result(x)
     class(parabolic_t), intent(in) :: self
     real(real64) :: x                                !! [length/time]
@@ -37,7 +37,7 @@ contains
     x = 8*self%reach/self%period
   end function highest_speed
 
-  !> Displacement of the side inwards from its mean position.
+  !> Inward displacement of the side from its mean position.
   elemental function displaced_by(self, tau) result(x)
     class(parabolic_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -48,7 +48,7 @@ contains
     x = 16*self%reach*merge(s*(0.5_real64 - s), (s - 0.5_real64)*(s - 1), s < 0.5_real64)
   end function displaced_by
 
-  !> Velocity of the side inwards.
+  !> Inward velocity of the side.
   elemental function velocity_at(self, tau) result(x)
     class(parabolic_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -59,7 +59,7 @@ contains
     x = highest_speed(self)*merge(1 - 4*s, 4*s - 3, s < 0.5_real64)
   end function velocity_at
 
-  !> Acceleration of the side inwards, just after the time tau.
+  !> Inward acceleration of the side, just after the time tau.
   elemental function acceleration(self, tau) result(x)
     class(parabolic_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -77,7 +77,7 @@ contains
     x = displaced_by(self, tau + modulo(s, self%period)) - displaced_by(self, tau)
   end function displacement
 
-  !> Change of the velocity of the side between the times tau and tau + s.
+  !> Change of velocity of the side between the times tau and tau + s.
   elemental function velocity_change(self, tau, s) result(x)
     class(parabolic_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -90,7 +90,8 @@ contains
     end if
   end function velocity_change
 
-  !> Displacement between the times tau and tau + s relative to uniform motion at the velocity at tau.
+  !> Displacement between the times tau and tau + s relative to uniform motion with the velocity at
+  !> tau.
   elemental function excess_displacement(self, tau, s) result(x)
     class(parabolic_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -99,7 +100,7 @@ contains
     x = 0.5_real64*acceleration(self, tau)*s*s
   end function excess_displacement
 
-  !> Whether the side follows a single parabola from tau to tau + s.
+  !> True if the side follows a single parabola from tau to tau + s.
   elemental function is_short(self, tau, s) result(yes)
     class(parabolic_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -108,7 +109,7 @@ contains
     yes = s <= 0.5_real64*self%period - modulo(tau, 0.5_real64*self%period)
   end function is_short
 
-  !> Time until the acceleration of the side changes its sign.
+  !> Time until the acceleration of the side changes sign.
   elemental function curvature_interval(self, tau, g) result(s)
     class(parabolic_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -121,12 +122,13 @@ contains
     s = minval(bend)
   end function curvature_interval
 
-  !> Time of contact within an interval in which side and disk move along parabolas.
+  !> Time of contact in an interval in which side and disk both move along parabolas.
   pure function first_contact(self, tau, gap, disk, from, to) result(s)
     class(parabolic_t), intent(in) :: self
     real(real64), intent(in) :: tau, gap             !! as in `contact_time`
-    real(real64), intent(in) :: disk(2)              !! velocity and acceleration of the disk [length/time, length/time**2]
-    real(real64), intent(in) :: from, to             !! the interval [time]
+    !> Velocity [length/time] and acceleration [length/time**2] of the disk.
+    real(real64), intent(in) :: disk(2)
+    real(real64), intent(in) :: from, to             !! start and end of the interval [time]
     real(real64) :: s, rate, curvature
 
     rate = (disk(1) - velocity_at(self, tau)) + (disk(2)*from - velocity_change(self, tau, from))

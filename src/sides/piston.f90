@@ -1,4 +1,4 @@
-!> A piston: a side with a mass, moved by a constant force and by collisions with disks.
+!> A piston: a side with a mass, driven by a constant force and by collisions with disks.
 module piston
   use fields, only: fields_t
   use free_flight, only: flight, flight_velocity, time_to_line
@@ -21,10 +21,10 @@ module piston
       "Constant inward force on the piston. Divided by the length of the side, it is the external pressure.", &
       not_negative, "energy/length", goes_with="motion "//word, may_change=in_motion)]
 
-  !> The length `reach` is the width of the box.
+  !> A piston whose `reach` is the width of the box.
   type, extends(side_motion_t) :: piston_t
     real(real64) :: mass = 1.0_real64                !! [mass]
-    real(real64) :: pull = 0.0_real64                !! acceleration inwards due to the force [length/time**2]
+    real(real64) :: pull = 0.0_real64                !! inward acceleration by the force [length/time**2]
   contains
     procedure :: read => read_piston
     procedure :: culprit
@@ -43,11 +43,11 @@ module piston
 
 contains
 
-  !> Reads mass and force.
+  !> Reads the mass and the force.
   subroutine read_piston(self, fields, width)
     class(piston_t), intent(inout) :: self
     class(fields_t), intent(inout) :: fields
-    real(real64), intent(in) :: width                !! distance between the side and the opposite side [length]
+    real(real64), intent(in) :: width                !! distance to the opposite side [length]
     real(real64) :: force
 
     force = 0
@@ -65,7 +65,7 @@ contains
     name = "position"
   end function culprit
 
-  !> A piston does not return.
+  !> The position of a piston changes permanently.
   elemental function moves_permanently(self) result(yes)
     class(piston_t), intent(in) :: self
     logical :: yes
@@ -73,16 +73,16 @@ contains
     yes = .true.
   end function moves_permanently
 
-  !> Lets the piston begin at a given displacement.
+  !> Lets the piston start at a given displacement.
   pure subroutine place_at(self, x, t)
     class(piston_t), intent(inout) :: self
-    real(real64), intent(in) :: x                    !! displacement inwards [length]
+    real(real64), intent(in) :: x                    !! inward displacement [length]
     real(real64), intent(in) :: t                    !! [time]
 
     call self%place(x)
   end subroutine place_at
 
-  !> Collisions with disks change the motion.
+  !> Collisions with disks change the motion of a piston.
   elemental function is_piston(self) result(yes)
     class(piston_t), intent(in) :: self
     logical :: yes
@@ -93,25 +93,27 @@ contains
   !> Change of the velocity of the piston in a collision.
   elemental function taken_from(self, change, mass) result(v)
     class(piston_t), intent(in) :: self
-    real(real64), intent(in) :: change               !! change of the velocity of the disk at infinite mass [length/time]
+    !> Velocity change of the disk if the mass of the piston were infinite [length/time].
+    real(real64), intent(in) :: change
     real(real64), intent(in) :: mass                 !! mass of the disk [mass]
     real(real64) :: v                                !! [length/time]
 
     v = change*mass/(mass + self%mass)
   end function taken_from
 
-  !> Time until the piston has moved by given lengths.
+  !> Time until the piston has moved by one of the given lengths.
   elemental function leaving_time(self, v, inwards, outwards) result(s)
     class(piston_t), intent(in) :: self
-    real(real64), intent(in) :: v                    !! present velocity inwards [length/time]
-    real(real64), intent(in) :: inwards, outwards    !! not negative; `never` if a length does not matter [length]
+    real(real64), intent(in) :: v                    !! present inward velocity [length/time]
+    !> Maximum displacement in each direction, >= 0; `never` for no limit [length].
+    real(real64), intent(in) :: inwards, outwards
     real(real64) :: s                                !! [time]
 
     s = time_to_line(inwards, v, self%pull)
     if (outwards < never) s = min(s, time_to_line(outwards, -v, -self%pull))
   end function leaving_time
 
-  !> Time since the state of the piston changed.
+  !> Time since the last change of the state of the piston.
   elemental function local_time(self, epoch, t, state) result(tau)
     class(piston_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
@@ -121,7 +123,7 @@ contains
     tau = t - state%clock
   end function local_time
 
-  !> Displacement of the piston inwards.
+  !> Inward displacement of the piston.
   elemental function position(self, tau, state) result(x)
     class(piston_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -131,7 +133,7 @@ contains
     x = flight(state%position, state%velocity, self%pull, tau)
   end function position
 
-  !> Velocity of the piston inwards.
+  !> Inward velocity of the piston.
   elemental function velocity(self, tau, state) result(x)
     class(piston_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -141,7 +143,7 @@ contains
     x = flight_velocity(state%velocity, self%pull, tau)
   end function velocity
 
-  !> Time until contact: the relative motion is a parabola.
+  !> Time until contact: the gap is a quadratic function of time.
   pure function contact_time(self, tau, gap, v, g, state) result(s)
     class(piston_t), intent(in) :: self
     real(real64), intent(in) :: tau, gap, v, g       !! see `side_motion`
@@ -151,7 +153,7 @@ contains
     s = time_to_line(gap, flight_velocity(state%velocity, self%pull, tau) - v, self%pull - g)
   end function contact_time
 
-  !> The initial displacement.
+  !> Initial displacement of the piston.
   elemental function innermost_position(self) result(x)
     class(piston_t), intent(in) :: self
     real(real64) :: x                                !! [length]
@@ -159,7 +161,7 @@ contains
     x = self%offset
   end function innermost_position
 
-  !> Speed of the fall through the box.
+  !> Speed of the piston after falling through the whole box.
   elemental function highest_speed(self) result(x)
     class(piston_t), intent(in) :: self
     real(real64) :: x                                !! [length/time]

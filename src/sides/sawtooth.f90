@@ -1,4 +1,5 @@
-!> A side that strikes each disk with a constant velocity but stays in place: the limit of a fast oscillation with small amplitude.
+!> A side that strikes each disk with a constant velocity but stays in place: the limit of fast
+!> oscillations of small amplitude.
 module sawtooth
   use fields, only: fields_t
   use kinds, only: never, real64
@@ -14,7 +15,7 @@ module sawtooth
       //"oscillation with small amplitude.")]
 
   type, extends(side_motion_t) :: sawtooth_t
-    real(real64) :: strike = 0.0_real64              !! velocity inwards [length/time]
+    real(real64) :: strike = 0.0_real64              !! inward velocity [length/time]
   contains
     procedure :: read => read_strike
     procedure :: check
@@ -30,11 +31,11 @@ module sawtooth
 
 contains
 
-  !> Reads the velocity.
+  !> Reads the velocity of the side.
   subroutine read_strike(self, fields, width)
     class(sawtooth_t), intent(inout) :: self
     class(fields_t), intent(inout) :: fields
-    real(real64), intent(in) :: width                !! not used
+    real(real64), intent(in) :: width                !! unused
 
     call fields%read("velocity", self%strike)
   end subroutine read_strike
@@ -56,7 +57,7 @@ contains
     name = "velocity"
   end function culprit
 
-  !> The side stays at the edge of the box.
+  !> False: the side stays at the edge of the box.
   elemental function moves(self) result(yes)
     class(sawtooth_t), intent(in) :: self
     logical :: yes
@@ -64,7 +65,7 @@ contains
     yes = .false.
   end function moves
 
-  !> Returns the time unchanged, because position and velocity of this side do not depend on it.
+  !> Returns the time unchanged, because position and velocity of the side are constant.
   elemental function local_time(self, epoch, t, state) result(tau)
     class(sawtooth_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t
@@ -74,7 +75,7 @@ contains
     tau = t
   end function local_time
 
-  !> The side stays at the edge of the box.
+  !> Zero: the side stays at the edge of the box.
   elemental function position(self, tau, state) result(x)
     class(sawtooth_t), intent(in) :: self
     real(real64), intent(in) :: tau
@@ -84,7 +85,7 @@ contains
     x = 0
   end function position
 
-  !> Velocity at which the side strikes.
+  !> Velocity with which the side strikes.
   elemental function velocity(self, tau, state) result(x)
     class(sawtooth_t), intent(in) :: self
     real(real64), intent(in) :: tau
@@ -104,7 +105,7 @@ contains
     s = never
   end function contact_time
 
-  !> The edge of the box.
+  !> Zero: the side stays at the edge of the box.
   elemental function innermost_position(self) result(x)
     class(sawtooth_t), intent(in) :: self
     real(real64) :: x
@@ -112,7 +113,7 @@ contains
     x = 0
   end function innermost_position
 
-  !> Speed at which the side strikes.
+  !> Speed with which the side strikes.
   elemental function highest_speed(self) result(x)
     class(sawtooth_t), intent(in) :: self
     real(real64) :: x                                !! [length/time]

@@ -11,7 +11,8 @@ module sine
   type(choice_t), parameter :: choices(*) = [ &
     choice_t("motion", word, "The side oscillates sinusoidally about its mean position.")]
 
-  !> Angle below which differences of sines are calculated by a power series, to avoid cancellation [radian]
+  !> Angle below which differences of sines are calculated by a power series, to avoid cancellation
+  !> [radian].
   real(real64), parameter :: small_angle = 0.5_real64
 
   type, extends(oscillation_t) :: sine_t
@@ -29,7 +30,7 @@ module sine
 
 contains
 
-  !> Highest speed of the side.
+  !> Maximum speed of the side.
   elemental function highest_speed(self) result(x)
     class(sine_t), intent(in) :: self
     real(real64) :: x                                !! [length/time]
@@ -37,7 +38,7 @@ contains
     x = 2*pi*self%reach/self%period
   end function highest_speed
 
-  !> Displacement of the side inwards from its mean position.
+  !> Inward displacement of the side from its mean position.
   elemental function displaced_by(self, tau) result(x)
     class(sine_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -46,7 +47,7 @@ contains
     x = self%reach*sin(2*pi*(modulo(tau, self%period)/self%period))
   end function displaced_by
 
-  !> Velocity of the side inwards.
+  !> Inward velocity of the side.
   elemental function velocity_at(self, tau) result(x)
     class(sine_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -55,7 +56,7 @@ contains
     x = highest_speed(self)*cos(2*pi*(modulo(tau, self%period)/self%period))
   end function velocity_at
 
-  !> Acceleration of the side inwards.
+  !> Inward acceleration of the side.
   elemental function acceleration(self, tau) result(x)
     class(sine_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -75,7 +76,7 @@ contains
     x = 2*self%reach*cos(2*pi*tau/self%period + half)*sin(half)
   end function displacement
 
-  !> Change of the velocity of the side between the times tau and tau + s.
+  !> Change of velocity of the side between the times tau and tau + s.
   elemental function velocity_change(self, tau, s) result(x)
     class(sine_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -86,7 +87,8 @@ contains
     x = -2*highest_speed(self)*sin(2*pi*tau/self%period + half)*sin(half)
   end function velocity_change
 
-  !> Displacement between the times tau and tau + s relative to uniform motion at the velocity at tau.
+  !> Displacement between the times tau and tau + s relative to uniform motion with the velocity at
+  !> tau.
   elemental function excess_displacement(self, tau, s) result(x)
     class(sine_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -95,11 +97,12 @@ contains
 
     angle = 2*pi*s/self%period
     angle2 = angle*angle
-    x = angle*angle2/6*(1 - angle2/20*(1 - angle2/42*(1 - angle2/72*(1 - angle2/110*(1 - angle2/156)))))  ! angle - sin(angle)
+    ! angle - sin(angle)
+    x = angle*angle2/6*(1 - angle2/20*(1 - angle2/42*(1 - angle2/72*(1 - angle2/110*(1 - angle2/156)))))
     x = -self%reach*(cos(2*pi*tau/self%period)*x + 2*sin(2*pi*tau/self%period)*sin(0.5_real64*angle)**2)
   end function excess_displacement
 
-  !> Whether the power series of `excess_displacement` is accurate.
+  !> True if the power series of `excess_displacement` is accurate.
   elemental function is_short(self, tau, s) result(yes)
     class(sine_t), intent(in) :: self
     real(real64), intent(in) :: tau, s               !! [time]
@@ -116,7 +119,7 @@ contains
     real(real64) :: s                                !! [time]
     real(real64) :: bend(2), ratio
 
-    bend = [0.0_real64, 0.5_real64]                  ! times in units of the period
+    bend = [0.0_real64, 0.5_real64]                  ! zeros of the acceleration, in units of the period
     ratio = g/(self%reach*(2*pi/self%period)**2)
     if (abs(ratio) < 1) bend = bend + [-1, 1]*asin(ratio)/(2*pi)
     bend = modulo(bend*self%period - tau, self%period)

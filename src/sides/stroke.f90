@@ -1,5 +1,5 @@
-!> A side that is at rest, moves at a constant velocity, and comes to rest again. A side at rest beside the edge of the box is a
-!> stroke with zero velocity.
+!> A stroke of a side: the side is at rest, moves at a constant velocity, and comes to rest again. A
+!> side at rest away from the edge of the box is a stroke of zero velocity.
 module stroke
   use fields, only: fields_t
   use free_flight, only: flight, time_to_line
@@ -23,9 +23,9 @@ module stroke
       "Time at which the side stops, later than start_time.", positive, "time", &
       goes_with="motion "//word, may_change=in_motion)]
 
-  !> The length `reach` is the sum of `offset` and the length of the path.
+  !> A stroke whose `reach` is the sum of `offset` and the length of its path.
   type, extends(side_motion_t) :: stroke_t
-    real(real64) :: speed = 0.0_real64               !! velocity inwards [length/time]
+    real(real64) :: speed = 0.0_real64               !! inward velocity [length/time]
     real(real64) :: start_time = 0.0_real64          !! [time]
     real(real64) :: end_time = 0.0_real64            !! [time]
   contains
@@ -49,11 +49,11 @@ module stroke
 
 contains
 
-  !> Reads velocity, start and end.
+  !> Reads the velocity, the start time and the end time.
   subroutine read_stroke(self, fields, width)
     class(stroke_t), intent(inout) :: self
     class(fields_t), intent(inout) :: fields
-    real(real64), intent(in) :: width                !! not used
+    real(real64), intent(in) :: width                !! unused
 
     call fields%read("velocity", self%speed)
     call fields%read("start_time", self%start_time)
@@ -80,7 +80,7 @@ contains
     if (self%speed > 0) name = "end_time"
   end function culprit
 
-  !> The side remains where the stroke ends.
+  !> The position of the side changes permanently.
   elemental function moves_permanently(self) result(yes)
     class(stroke_t), intent(in) :: self
     logical :: yes
@@ -88,7 +88,7 @@ contains
     yes = .true.
   end function moves_permanently
 
-  !> Time at which the side stops.
+  !> Time when the side stops.
   elemental function final_time(self) result(t)
     class(stroke_t), intent(in) :: self
     real(real64) :: t                                !! [time]
@@ -96,7 +96,7 @@ contains
     t = self%end_time
   end function final_time
 
-  !> Velocity before the side stops.
+  !> Inward velocity just before the side stops.
   elemental function final_velocity(self) result(v)
     class(stroke_t), intent(in) :: self
     real(real64) :: v                                !! [length/time]
@@ -104,7 +104,7 @@ contains
     v = self%speed
   end function final_velocity
 
-  !> Whether the side never moves.
+  !> True if the side never moves.
   elemental function stands(self) result(yes)
     class(stroke_t), intent(in) :: self
     logical :: yes
@@ -112,7 +112,7 @@ contains
     yes = .not. abs(self%speed) > 0
   end function stands
 
-  !> Whether the stroke is the same, or neither side ever moves.
+  !> True if the two strokes are equal, or if neither side ever moves.
   pure function continues(self, other) result(yes)
     class(stroke_t), intent(in) :: self
     class(side_motion_t), intent(in) :: other
@@ -129,16 +129,16 @@ contains
   !> Sets the displacement at the start of the stroke.
   pure subroutine place(self, offset)
     class(stroke_t), intent(inout) :: self
-    real(real64), intent(in) :: offset               !! displacement inwards [length]
+    real(real64), intent(in) :: offset               !! inward displacement [length]
 
     self%offset = offset
     self%reach = abs(offset) + abs(self%speed)*(self%end_time - self%start_time)
   end subroutine place
 
-  !> Lets the stroke begin so that the side has a given displacement at a given time.
+  !> Starts the stroke such that the side has a given displacement at a given time.
   pure subroutine place_at(self, x, t)
     class(stroke_t), intent(inout) :: self
-    real(real64), intent(in) :: x                    !! displacement inwards [length]
+    real(real64), intent(in) :: x                    !! inward displacement [length]
     real(real64), intent(in) :: t                    !! time since the start of the run [time]
 
     call self%place(x - self%speed*(min(max(t, self%start_time), self%end_time) - self%start_time))
@@ -154,7 +154,7 @@ contains
     tau = (epoch - self%start_time) + t
   end function local_time
 
-  !> Displacement of the side inwards.
+  !> Inward displacement of the side.
   elemental function position(self, tau, state) result(x)
     class(stroke_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -164,7 +164,7 @@ contains
     x = self%offset + self%speed*min(max(tau, 0.0_real64), self%end_time - self%start_time)
   end function position
 
-  !> Velocity of the side inwards.
+  !> Inward velocity of the side.
   elemental function velocity(self, tau, state) result(x)
     class(stroke_t), intent(in) :: self
     real(real64), intent(in) :: tau                  !! [time]
@@ -175,7 +175,7 @@ contains
     if (tau < 0 .or. tau >= self%end_time - self%start_time) x = 0
   end function velocity
 
-  !> Time until contact: the earliest contact before, during and after the stroke.
+  !> Time until contact, before, during or after the stroke.
   pure function contact_time(self, tau, gap, v, g, state) result(s)
     class(stroke_t), intent(in) :: self
     real(real64), intent(in) :: tau, gap, v, g       !! see `side_motion`
@@ -195,7 +195,7 @@ contains
     s = never
   end function contact_time
 
-  !> Displacement at the start or at the end of the stroke.
+  !> Larger of the inward displacements before and after the stroke.
   elemental function innermost_position(self) result(x)
     class(stroke_t), intent(in) :: self
     real(real64) :: x                                !! [length]
@@ -203,7 +203,7 @@ contains
     x = self%offset + max(0.0_real64, self%speed*(self%end_time - self%start_time))
   end function innermost_position
 
-  !> Speed of the stroke.
+  !> Speed of the side during the stroke.
   elemental function highest_speed(self) result(x)
     class(stroke_t), intent(in) :: self
     real(real64) :: x                                !! [length/time]
