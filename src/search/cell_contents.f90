@@ -1,6 +1,6 @@
-!> Contents of the cells. A cell is a record of 16 bytes, copied as a unit: a count and three slots,
-!> each for the index of one disk. In a crowded cell, one with more than three disks, the additional
-!> disks form a linked list that starts in the last slot.
+!> The disks in each cell. A cell is a record of 16 bytes, copied as a unit, with a count and three
+!> slots for one disk each. If a cell contains more than three disks (a crowded cell), the
+!> additional disks form a linked list that starts in the last slot.
 module cell_contents
   use kinds, only: int16, int32, int64
   use disks, only: disk_t, tag_t
@@ -13,11 +13,12 @@ module cell_contents
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
   integer(int32), parameter :: counted = 65535               !! bit mask for the number of disks in the slots
-  integer(int32), parameter :: crowd = counted + 1           !! increment of the bit field that counts crowded cells
+  !> Increment of the bit field that counts crowded cells.
+  integer(int32), parameter :: crowd = counted + 1
   integer(int32), parameter :: marked = shiftl(crowd, 8)     !! bit that marks the cell
 
-  !> The array `slot` holds three indices of disks, counted from 0, and, as its last element, bit
-  !> fields:
+  !> The first three elements of `slot` are indices of disks, counted from 0. The last element
+  !> contains bit fields:
   !> - bits 0 to 15: number of disks in the slots,
   !> - bits 16 to 23: number of crowded cells among the cell and its eight neighbours,
   !> - bit 24: mark of the cell (see `cell_grid: mark`).
@@ -29,9 +30,10 @@ module cell_contents
   end type cell_t
 
   type :: cell_contents_t
-    integer(int32) :: stride = 0                 !! difference between the numbers of two cells in adjacent rows
+    integer(int32) :: stride = 0      !! difference between the numbers of vertically adjacent cells
     type(cell_t), allocatable :: cell(:)         !! (0:) cells, row by row
-    integer(int32), allocatable :: next(:)       !! (disks) next disk in the linked list of a crowded cell; 0 at the end of the list
+    !> Next disk in the linked list of a crowded cell, for each disk; 0 at the end of the list.
+    integer(int32), allocatable :: next(:)
   contains
     procedure :: number
     procedure :: empty
@@ -56,7 +58,7 @@ contains
     c = cell(1) + self%stride*cell(2)
   end function number
 
-  !> Allocates `rows` rows of `stride` empty cells, for n_disks disks.
+  !> Allocates `rows` rows of `stride` empty cells, for a given number of disks.
   subroutine empty(self, stride, rows, n_disks)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: stride, rows, n_disks
@@ -76,7 +78,7 @@ contains
   pure subroutine clear(self, c, n)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c
-    integer(int32), intent(inout) :: n             !! number of disks removed from cells so far
+    integer(int32), intent(inout) :: n             !! total number of removed disks
     integer(int32) :: link, in_slots
 
     in_slots = self%cell(c)%in_slots()
@@ -118,7 +120,7 @@ contains
         return
       end if
       head = slot(cell_capacity) + 1
-      self%next(i) = head                          ! disk i becomes the head of the list
+      self%next(i) = head                          ! disk i becomes the first in the list
       slot(cell_capacity) = i - 1
     end associate
     if (self%next(head) == 0) call self%count_crowd(c, 1)
@@ -139,7 +141,7 @@ contains
         slot(count_slot) = slot(count_slot) - 1
         return
       end if
-      if (slot(k) == i - 1) then                   ! the head of the list is moved to the free slot
+      if (slot(k) == i - 1) then                   ! the first disk of the list moves to the free slot
         slot(k) = link - 1
         slot(cell_capacity) = self%next(link) - 1
         self%next(link) = 0
@@ -153,8 +155,8 @@ contains
     if (self%chain(c) == 0) call self%count_crowd(c, -1)
   end subroutine remove
 
-  !> Updates the counts of crowded cells in cell c and its eight neighbours: `change` is 1 if cell c
-  !> has become crowded, and -1 if it no longer is.
+  !> Updates the counts of crowded cells in cell c and its eight neighbours. `change` is 1 if cell c
+  !> has become crowded, -1 if it no longer is.
   pure subroutine count_crowd(self, c, change)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c, change
@@ -175,8 +177,8 @@ contains
     n = iand(self%slot(count_slot), counted)
   end function in_slots
 
-  !> True if predictions for disks in a cell need the general procedure, because the cell is marked,
-  !> or because the cell or one of its eight neighbours is crowded.
+  !> True if predictions for the disks in a cell need the general procedure: the cell is marked, is
+  !> crowded, or has a crowded neighbour.
   elemental function needs_care(self) result(yes)
     class(cell_t), intent(in) :: self
     logical :: yes
@@ -184,7 +186,7 @@ contains
     yes = self%slot(count_slot) >= crowd
   end function needs_care
 
-  !> True if cell c or any of its eight neighbours is crowded.
+  !> True if cell c or one of its eight neighbours is crowded.
   pure function is_crowded_around(self, c) result(yes)
     class(cell_contents_t), intent(in) :: self
     integer(int32), intent(in) :: c
@@ -193,8 +195,8 @@ contains
     yes = iand(self%cell(c)%slot(count_slot), marked - crowd) > 0
   end function is_crowded_around
 
-  !> First disk in the linked list of cell c, which also occupies the last slot; 0 if the cell is
-  !> not crowded.
+  !> First disk in the linked list of a crowded cell, which also occupies the last slot; 0 if the
+  !> cell is not crowded.
   pure function chain(self, c) result(i)
     class(cell_contents_t), intent(in) :: self
     integer(int32), intent(in) :: c
@@ -206,7 +208,7 @@ contains
     if (self%next(i) == 0) i = 0
   end function chain
 
-  !> Number of slots before that of disk i in its cell; 2 if the disk is in the linked list.
+  !> Number of slots before the slot of disk i in its cell; 2 if the disk is in the linked list.
   elemental function slots_before(self, i) result(n)
     type(cell_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -216,10 +218,10 @@ contains
     n = first + iand(first, merge(0, 1, self%slot(2) == i - 1))
   end function slots_before
 
-  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i itself, which is
-  !> in cell c. All slots are copied, whether occupied or vacant, to avoid branches that depend on
-  !> the numbers of disks. If disk i is in the linked list of a crowded cell instead of a slot, the
-  !> head of that list is left out in its place.
+  !> Lists the disks in the slots of cell c and its eight neighbours, except disk i, which is in
+  !> cell c. All slots are copied, occupied or vacant, to avoid branches that depend on the number
+  !> of disks. If disk i is in the linked list of a crowded cell, the first disk of this list is
+  !> left out instead of disk i.
   subroutine gather(cell, c, stride, i, list, n)
     type(cell_t), intent(in) :: cell(0:*)
     integer(int32), intent(in) :: c, stride, i
@@ -256,9 +258,9 @@ contains
     n = n + cell%in_slots()
   end subroutine append
 
-  !> Prefetches the data needed to predict the next events of several disks, in three stages: the
-  !> records of the disks, their cells, and the disks in these cells. The collision partner of a
-  !> disk is one call behind in each stage.
+  !> Prefetches the data for predicting the next events of several disks, in three stages: the
+  !> records of the disks, their cells, and the disks in these cells. In each stage, the collision
+  !> partner of a disk is prefetched one call later than the disk.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_contents_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -296,12 +298,12 @@ contains
       integer(int32) :: m
 
       do m = c - self%stride, c + self%stride, self%stride
-        call prefetch(self%cell(m - 1)%slot(1))    ! three adjacent cells lie in one or two cache lines
+        call prefetch(self%cell(m - 1)%slot(1))    ! three adjacent cells occupy one or two cache lines
         call prefetch(self%cell(m + 1)%slot(count_slot))
       end do
     end subroutine fetch_cells
 
-    !> Prefetches the first disk in cell c and in each of its eight neighbours.
+    !> Prefetches the first disk of cell c and of each of its eight neighbours.
     subroutine fetch_disks(c)
       integer(int32), intent(in) :: c
       integer(int32) :: m, l

@@ -1,8 +1,8 @@
-!> Faces of the cells, including the sides of the box, and the times at which disks cross them.
+!> Faces of the cells, including the sides of the box, and the times when disks cross them.
 !>
-!> Neighbouring cells overlap. The overlap is the largest for which two disks in contact are always in the same cell or in adjacent
-!> cells. A disk in an overlap is assigned to the cell that it will leave last. With cells much wider than disks, this halves the
-!> number of cell crossings.
+!> Neighbouring cells overlap. The overlap is the largest for which two disks in contact are always
+!> in the same cell or in adjacent cells. A disk in an overlap is assigned to the cell that it will
+!> leave last. If the cells are much wider than the disks, this halves the number of cell crossings.
 module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t
@@ -16,19 +16,21 @@ module cell_faces
   private
   public :: all_cells, cell_faces_t, line_t, patch_t
 
-  !> A rectangular block of cells: usually all cells of the box; in a parallel run, those of a domain and its halo, possibly across
-  !> a periodic side. A disk that crosses an outer face leaves the block, unless the face is a side of the box.
+  !> A rectangular block of cells: usually all cells of the box; in a parallel run, the cells of a
+  !> domain and its halo, possibly across a periodic side. A disk that crosses an outer face leaves
+  !> the block, unless the face is a side of the box.
   type :: patch_t
     integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the whole box
-    !> First column and row of the block; below 1 if the block begins beyond a periodic side of the box.
+    !> First column and row of the block; below 1 if the block starts beyond a periodic side of the
+    !> box.
     integer(int32) :: first(2) = 1
     integer(int32) :: n(2) = 0                     !! numbers of columns and rows in the block
-    real(real64) :: small = 0.0_real64             !! largest radius for which the cells are wide enough [length]
-    real(real64) :: reach = 0.0_real64             !! largest distance between the centres of two disks in contact [length]
+    real(real64) :: small = 0.0_real64      !! maximum radius for which the cells are wide enough [length]
+    real(real64) :: reach = 0.0_real64    !! maximum distance between the centres of disks in contact [length]
     real(real64) :: lower(2) = 0.0_real64          !! lower left corner of the box [length]
-    real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
-    ! If a periodic side lies inside the block, `last` is the column or row just before it and `next` the one just behind it. Both
-    ! are 0 along an axis without such a side.
+    real(real64) :: width(2) = 0.0_real64          !! distance between adjacent cells [length]
+    ! Along an axis with a periodic side inside the block, `last` is the column or row just before
+    ! this side and `next` the one just behind it. Along an axis without such a side, both are 0.
     integer(int32) :: last(2) = 0
     integer(int32) :: next(2) = 0
   contains
@@ -42,34 +44,37 @@ module cell_faces
     procedure :: equals
   end type patch_t
 
-  !> A line parallel to an axis that bounds a cell: a face of a column or row of cells, or a side of the box.
+  !> A line parallel to an axis that bounds a cell: a face of a column or row of cells, or a side of
+  !> the box.
   type :: line_t
     real(real64) :: place = 0.0_real64             !! position of the face or side [length]
-    !> Signed distance of the disk's centre from the line at the event, in units of its radius: 1 for a left or bottom wall, -1 for
-    !> a right or top wall, 0 for a face and for a periodic or open side.
+    !> Signed distance from the line to the centre of a disk at the event, in units of the radius: 1
+    !> for a left or bottom wall, -1 for a right or top wall, 0 for a face and for a periodic or
+    !> open side.
     real(real64) :: inset = 0.0_real64
     integer(int32) :: code = 0                     !! code of the event: contact with a side, or cell crossing
     logical :: struck = .false.                    !! whether a moving side may touch disks in this cell
   end type line_t
 
   type :: cell_faces_t
-    real(real64) :: width(2) = 0.0_real64          !! distance between the centres of adjacent cells [length]
+    real(real64) :: width(2) = 0.0_real64          !! distance between adjacent cells [length]
     real(real64) :: overlap(2) = 0.0_real64        !! width of the overlap of neighbouring cells [length]
     logical :: moving = .false.                    !! whether the box has moving sides
-    !> whether gravity acts or sides move, so that both faces of an axis must be tested
+    !> Whether gravity acts or sides move, so that both faces of an axis must be tested.
     logical :: falling = .false.
     logical :: periodic(2) = .false.               !! whether the box is periodic along each axis
-    ! A piston can eventually reach any part of the box, but until it has moved by one cell width, it can touch only disks in a
-    ! strip: a few adjacent columns or rows. `due` is the earliest time at which any piston leaves its strip, relative to
-    ! `box%epoch` [time]
+    ! A piston can eventually reach every part of the box. Until it has moved by one cell width,
+    ! however, it can touch only disks in a few adjacent columns or rows, called its strip. `due` is
+    ! the earliest time when any piston leaves its strip, relative to `box%epoch` [time]
     real(real64) :: due = never
-    !> Centre of the strip of each piston, as an inward displacement from the mean position of the side [length]
+    !> Centre of the strip of each piston, as inward displacement from the mean position of the side
+    !> [length].
     real(real64) :: centre(n_sides) = 0.0_real64
-    !> (axis, 1: lower side, 2: upper side) largest distance of a disk beyond the mean position of
-    !> each side [length]
+    !> Maximum distance of a disk beyond the mean position of each side; shape (axis, lower or upper
+    !> side) [length].
     real(real64) :: beyond(2, 2) = 0.0_real64
-    type(line_t), allocatable :: column(:, :)      !! (0:1,columns) left and right faces
-    type(line_t), allocatable :: row(:, :)         !! (0:1,rows) lower and upper faces
+    type(line_t), allocatable :: column(:, :)     !! left and right faces of each column; shape (0:1, columns)
+    type(line_t), allocatable :: row(:, :)         !! lower and upper faces of each row; shape (0:1, rows)
   contains
     procedure :: set
     procedure :: find_strips
@@ -83,18 +88,19 @@ module cell_faces
 
 contains
 
-  !> The block of all cells of a box that is divided into n(1) columns and n(2) rows.
+  !> The block of all cells of a box with n(1) columns and n(2) rows.
   pure function all_cells(box, n, reach) result(patch)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: n(2)
-    real(real64), intent(in) :: reach              !! largest distance between the centres of disks in contact [length]
+    real(real64), intent(in) :: reach     !! maximum distance between the centres of disks in contact [length]
     type(patch_t) :: patch
 
     patch%whole = n
     patch%n = n
     patch%reach = reach
     patch%lower = box%lower
-    ! The last face must not fall inside the box because of rounding errors, so the cells are made slightly wider.
+    ! The cells are made slightly wider, so that rounding errors cannot put the last face inside the
+    ! box.
     patch%width = box%edges()/n*(1 + 4*epsilon(reach))
     call patch%find_sides(box%periodic)
   end function all_cells
@@ -112,7 +118,7 @@ contains
     end where
   end subroutine find_sides
 
-  !> Column and row of the block that contain a point of the box; beyond `n` if the point is outside the block.
+  !> Column and row, within the block, of a point of the box; greater than `n` outside the block.
   pure function cell_at(self, x) result(cell)
     class(patch_t), intent(in) :: self
     real(real64), intent(in) :: x(2)               !! [length]
@@ -122,7 +128,7 @@ contains
     if (self%first(1) /= 1 .or. self%first(2) /= 1) cell = modulo(cell - self%first, self%whole) + 1
   end function cell_at
 
-  !> Converts the number of a column or row, counted within the block, to its number in the grid of the whole box.
+  !> Converts a column or row number of the block to that of the grid of the whole box.
   elemental function place_of(self, cell, axis) result(place)
     class(patch_t), intent(in) :: self
     integer(int32), intent(in) :: cell
@@ -141,10 +147,10 @@ contains
     yes = all(cell >= 1 .and. cell <= self%n)
   end function holds
 
-  !> True if all given cells, numbered as in the whole grid, belong to the block.
+  !> True if all given cells, numbered as in the grid of the whole box, belong to the block.
   pure function covers(self, cell) result(yes)
     class(patch_t), intent(in) :: self
-    integer(int16), intent(in) :: cell(:, :)       !! (2,n)
+    integer(int16), intent(in) :: cell(:, :)       !! shape (2, n)
     logical :: yes(size(cell, 2))
 
     yes = modulo(cell(1, :) - self%first(1), self%whole(1)) < self%n(1) &
@@ -160,7 +166,8 @@ contains
     yes = any(cell == self%last .or. cell == self%next)
   end function at_seam
 
-  !> Finds the column or row `ahead` steps from a given one, and the number of periodic sides in between.
+  !> Finds the column or row `ahead` steps away from a given one, and the number of periodic sides
+  !> between them.
   pure subroutine step(self, axis, cell, ahead, there, periods)
     class(patch_t), intent(in) :: self
     integer, intent(in) :: axis
@@ -171,7 +178,8 @@ contains
     periods = 0
     associate (last => self%last(axis), n => self%n(axis))
       if (last == 0) return
-      if (last < n) periods = merge(1, 0, there > last) - merge(1, 0, cell > last)      ! the periodic side is inside the block
+      ! the periodic side is inside the block
+      if (last < n) periods = merge(1, 0, there > last) - merge(1, 0, cell > last)
       if (last < n) return
       do while (there > n)
         there = there - n
@@ -184,7 +192,7 @@ contains
     end associate
   end subroutine step
 
-  !> True if two blocks consist of the same cells, chosen for disks of the same sizes.
+  !> True if two blocks consist of the same cells and were chosen for disks of the same sizes.
   pure function equals(self, other) result(yes)
     class(patch_t), intent(in) :: self
     type(patch_t), intent(in) :: other
@@ -195,7 +203,7 @@ contains
       .and. all(abs(self%lower - other%lower) <= 0) .and. all(abs(self%width - other%width) <= 0)
   end function equals
 
-  !> Sets up the faces of the cells of a block.
+  !> Sets up the faces of the cells in a block.
   subroutine set(self, box, patch, now)
     class(cell_faces_t), intent(out) :: self
     type(box_t), intent(in) :: box
@@ -253,12 +261,13 @@ contains
     end subroutine find_struck
   end subroutine set
 
-  !> Finds the columns and rows in which a piston may touch disks before it has moved by the width of a cell. The outermost cells
-  !> also hold the disks beyond the grid, and are therefore within reach of a piston that has moved out of the grid on either side.
+  !> Finds the columns and rows in which a piston may touch disks before it has moved by one cell
+  !> width. The outermost cells also contain the disks beyond the grid, so a piston outside the grid
+  !> may touch the disks in these cells.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
-    real(real64), intent(in) :: small              !! largest radius [length]
+    real(real64), intent(in) :: small              !! maximum radius [length]
     real(real64), intent(in) :: now
     integer :: k
 
@@ -286,8 +295,8 @@ contains
     end subroutine mark
   end subroutine find_strips
 
-  !> Finds the earliest time at which any piston leaves its strip of columns or rows. The result is valid until a disk collides with
-  !> a piston.
+  !> Finds the earliest time when any piston leaves its strip. The result is valid until the next
+  !> collision of a disk with a piston.
   pure subroutine watch_pistons(self, box, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -308,25 +317,26 @@ contains
     end do
   end subroutine watch_pistons
 
-  !> Rectangle that contains the centres of all disks in a cell. For a cell at a side of the box, it extends to the outermost
-  !> position of that side; towards a piston it is unbounded.
+  !> Rectangle that contains the centres of all disks in a cell. At a side of the box, the rectangle
+  !> extends to the outermost position of that side; towards a piston it is unbounded.
   pure subroutine rectangle(self, cell, n, low, high)
     class(cell_faces_t), intent(in) :: self
     integer(int32), intent(in) :: cell(2)          !! column and row in the grid of the whole box
-    integer(int32), intent(in) :: n(2)             !! numbers of columns and rows in the box
+    integer(int32), intent(in) :: n(2)             !! numbers of columns and rows of the box
     real(real64), intent(out) :: low(2), high(2)   !! relative to the lower left corner of the box [length]
 
     low = self%width*(cell - 1) - 0.5_real64*self%overlap - merge(self%beyond(:, 1), 0.0_real64, cell == 1)
     high = self%width*cell + 0.5_real64*self%overlap + merge(self%beyond(:, 2), 0.0_real64, cell == n)
   end subroutine rectangle
 
-  !> Chooses, among the overlapping cells that contain the disk, the one that it will leave last.
+  !> Among the overlapping cells that contain the disk, chooses the cell that the disk will leave
+  !> last.
   pure subroutine choose_cell(self, gravity, disk, now, cell)
     class(cell_faces_t), intent(in) :: self
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    integer(int16), intent(inout) :: cell(2)       !! in: any cell that contains the disk
+    integer(int16), intent(inout) :: cell(2)       !! on entry, any cell that contains the disk
     real(real64) :: s
 
     s = now - disk%clock
@@ -334,8 +344,8 @@ contains
     cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), gravity(2), s, cell(2))
   end subroutine choose_cell
 
-  !> Change of a disk's column or row along one axis: 1 or -1 if the next cell in its direction of motion also contains the disk,
-  !> otherwise 0.
+  !> Change of the column or row of a disk along one axis: 1 or -1 if the next cell in the direction
+  !> of motion also contains the disk, otherwise 0.
   pure function ahead(line, overlap, x, v, g, s, cell) result(step)
     type(line_t), intent(in) :: line(0:1, *)
     real(real64), intent(in) :: overlap, x, v, g, s
@@ -349,7 +359,8 @@ contains
     step = int(chosen(0_int32, 2*up - 1, left < overlap .and. .not. is_wall(line(up, cell)%code)), int16)
   end function ahead
 
-  !> Returns `second` if the condition holds and `first` otherwise, without a branch, which would often be mispredicted.
+  !> Selects `second` if the condition is true, otherwise `first`, without a branch, which would
+  !> often be mispredicted.
   elemental function chosen(first, second, condition) result(n)
     integer(int32), intent(in) :: first, second
     logical, intent(in) :: condition
@@ -358,7 +369,7 @@ contains
     n = ieor(first, iand(-merge(1, 0, condition), ieor(first, second)))
   end function chosen
 
-  !> Finds the earliest event at which the disk leaves its cell or touches a side within it.
+  !> Finds the earliest event at which the disk leaves its cell or touches a side in it.
   pure subroutine next(self, box, disk, cell, now, falling, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -366,7 +377,7 @@ contains
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
     logical, intent(in) :: falling
-    type(prediction_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
+    type(prediction_t), intent(inout) :: near        !! the time and partner of the earliest event are set
 
     if (falling) then
       call self%next_falling(box, self%column(:, cell(1)), self%row(:, cell(2)), disk, now, near)
@@ -375,15 +386,15 @@ contains
     end if
   end subroutine next
 
-  !> Finds the earliest event at which the disk reaches one of four given lines around it: the faces of its cell, or closer lines
-  !> that bound its neighbourhood.
+  !> Finds the earliest event at which the disk reaches one of four lines around it: the faces of
+  !> its cell, or closer lines that bound its neighbourhood.
   pure subroutine next_within(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    type(prediction_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
+    type(prediction_t), intent(inout) :: near        !! the time and partner of the earliest event are set
 
     if (self%falling) then
       call self%next_falling(box, column, row, disk, now, near)
@@ -392,8 +403,8 @@ contains
     end if
   end subroutine next_within
 
-  !> Version of `next_within` for disks on straight paths. Axis and direction are selected without
-  !> branches, which would often be mispredicted.
+  !> Version of `next_within` for straight paths. Axis and direction are selected without branches,
+  !> which would often be mispredicted.
   pure subroutine next_straight(column, row, disk, cell, t, code)
     type(line_t), intent(in) :: column(0:1, *), row(0:1, *)
     type(disk_t), intent(in) :: disk
@@ -411,8 +422,9 @@ contains
     t = merge(t_y, t_x, t_y < t_x)
   end subroutine next_straight
 
-  !> Time at which a disk on a straight path reaches a line ahead of it along one axis. If the line is a side, the time is
-  !> bit-identical to that of `side_time`: the result must not depend on the procedure that predicts a collision.
+  !> Time at which a disk on a straight path reaches the line ahead along one axis. If the line is a
+  !> side, the time is bit-identical to that of `side_time`, because the result must not depend on
+  !> the procedure that predicts a collision.
   pure function line_time(line, disk, axis) result(t)
     type(line_t), intent(in) :: line
     type(disk_t), intent(in) :: disk
@@ -426,14 +438,14 @@ contains
     t = merge(t, never, speed > slowest)
   end function line_time
 
-  !> Version of `next_within` for disks on parabolic paths, and for boxes with moving sides.
+  !> Version of `next_within` for parabolic paths and for boxes with moving sides.
   pure subroutine next_falling(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    type(prediction_t), intent(inout) :: near        !! the procedure sets the time and partner of the earliest event
+    type(prediction_t), intent(inout) :: near        !! the time and partner of the earliest event are set
     real(real64) :: t_x, t_y
     integer(int32) :: code_x, code_y
 
@@ -448,7 +460,7 @@ contains
     near%time = merge(t_y, t_x, t_y < t_x)
   end subroutine next_falling
 
-  !> Version of `next_falling` for a single axis, without moving sides.
+  !> Version of `next_falling` for a single axis without moving sides.
   pure subroutine next_along(box, line, axis, disk, now, t, code)
     type(box_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
@@ -469,13 +481,13 @@ contains
       t_other = falling_time(line(1 - up), axis, box, disk, now)
       up = chosen(up, 1 - up, t_other < t)
       t = min(t, t_other)
-    else                                           ! the face ahead, or the face behind if gravity reverses the motion
+    else                                           ! face ahead, or face behind if gravity reverses the motion
       x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
       v = flight_velocity(disk%v(axis), g, now - disk%clock)
       up = merge(1, 0, v > -g*resolution(now))
-      sense = 2*up - 1                             ! simplified form of the formulas in `time_to_line`
+      sense = 2*up - 1                             ! simplified formulas of `time_to_line`
       gap = max(sense*(line(up)%place - x), 0.0_real64)
-      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! `tiny` keeps `disc` positive if the disk is at rest on the face
+      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! positive even for a disk at rest on the face
       if (disc >= 0) then
         t = now + 2*gap/(abs(v) + sqrt(disc))
       else
@@ -504,7 +516,8 @@ contains
     end if
   end subroutine next_beside
 
-  !> Version of `next_along` for a cell that a moving side may enter, even if the side is not a face of the cell.
+  !> Version of `next_along` for a cell in which a moving side may touch disks, even if the side is
+  !> not a face of the cell.
   pure subroutine next_moving(line, axis, box, disk, now, t, code)
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
     integer(int32), intent(in) :: axis
@@ -530,8 +543,8 @@ contains
     end do
   end subroutine next_moving
 
-  !> Time at which a disk on a parabolic path reaches a face or side. The earlier root of the equation of motion, at which the disk
-  !> entered the cell, is excluded.
+  !> Time at which a disk on a parabolic path reaches a face or side. The equation of motion has an
+  !> earlier root, at which the disk entered the cell; this root is excluded.
   pure function falling_time(line, axis, box, disk, now) result(t)
     type(line_t), intent(in) :: line
     integer(int32), intent(in) :: axis
@@ -548,12 +561,12 @@ contains
     sense = sense_of(side_crossed(line%code))
     g = box%gravity(axis)
     if (sense*flight_velocity(disk%v(axis), g, now - disk%clock + resolution(now)) <= 0 &
-      .and. sense*g < 0) return                    ! the disk accelerates away from the line
+      .and. sense*g < 0) return                    ! accelerating away from the line
     t = max(now, disk%clock + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*g))
   end function falling_time
 
-  !> Smallest time difference resolved at the time `now`; without this limit, a disk turning round at a face could cross it
-  !> infinitely often.
+  !> Smallest time difference resolved at the time `now`. Without this limit, a disk that turns
+  !> round at a face could cross the face infinitely often.
   elemental function resolution(now)
     real(real64), intent(in) :: now
     real(real64) :: resolution

@@ -1,5 +1,6 @@
-!> Cell search (linked-cell method). Cells are at least one diameter wide, so that a disk can touch only disks in the 3 x 3 cells
-!> around it until it leaves its own cell, which is an event. Wide cells overlap (see `cell_faces`).
+!> Cell search (linked-cell method). The cells are at least one diameter wide, so that a disk can
+!> touch only the disks in the 3 x 3 cells around it until it leaves its own cell, which is an
+!> event. Wide cells overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, next_obstacle
@@ -20,22 +21,22 @@ module cell_grid
   private
   public :: cell_grid_t
 
-  real(real64), parameter :: spacious = 1.2_real64  !! width of cells, in largest diameters, above which overlapping cells save time
+  real(real64), parameter :: spacious = 1.2_real64  !! minimum width of overlapping cells, in diameters
 
   type :: cell_grid_t
     private
-    type(patch_t), public :: patch                 !! block of cells; chosen by `build`, unless the search belongs to a domain
+    type(patch_t), public :: patch               !! block of cells, chosen by `build` or by a domain
     logical, public :: is_part = .false.
-    logical, public :: undivided = .false.         !! whether the box is a single cell, in which all pairs are tested
-    logical, public :: everyone = .false.          !! whether each event requires new predictions for all disks
-    type(cell_faces_t), public :: faces                    !! faces of the cells, and sides
-    logical, public :: roomy = .false.             !! whether cells overlap, so that a collision can reassign a disk to another cell
-    type(cell_contents_t), public :: cells                 !! disks in each cell, including a border of empty cells around the block
-    type(object_lists_t), public :: reach           !! obstacles, and disks that are too large for the width of the cells
+    logical, public :: undivided = .false.       !! whether a single cell contains all disks
+    logical, public :: everyone = .false.        !! whether all disks are predicted anew after each event
+    type(cell_faces_t), public :: faces                    !! faces of the cells and sides of the box
+    logical, public :: roomy = .false.           !! whether cells overlap
+    type(cell_contents_t), public :: cells       !! cells with their disks, and a border of empty cells
+    type(object_lists_t), public :: reach        !! obstacles, and disks that are too large for the cells
     type(images_t) :: images                       !! periodic images of the box
-    integer(int32), public :: n_listed = 0         !! number of disks inserted into cells
-    type(neighbour_lists_t), public :: lists       !! neighbour lists of the small disks, used if cells contain many disks
-    real(real64) :: plain_radius = 0.0_real64  !! largest radius of disks that cross cells without changing a list, or -1 [length]
+    integer(int32), public :: n_listed = 0         !! number of disks in the cells
+    type(neighbour_lists_t), public :: lists     !! of the small disks, used if cells contain many disks
+    real(real64) :: plain_radius = 0.0_real64    !! largest radius for simple cell crossings, or -1 [length]
   contains
     procedure :: build
     procedure :: predict
@@ -43,7 +44,7 @@ module cell_grid
     procedure :: cross
     procedure :: insert
     procedure :: take_out
-    procedure :: predict_with_care                 ! type-bound, so that the compiler does not inline the procedure
+    procedure :: predict_with_care      ! type-bound, so that the compiler does not inline the procedure
     procedure :: read_ahead
     procedure, private :: find_event_of_big        ! as above
     procedure, private :: cross_with_care
@@ -53,12 +54,12 @@ module cell_grid
 
 contains
 
-  !> Chooses the cells and assigns all disks to them. The lists of obstacles are renewed only if the cells have changed.
+  !> Chooses the cells and inserts all disks. Lists of obstacles are renewed only for new cells.
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(place_t), allocatable :: rims(:)
-    logical :: kept                                ! whether the lists of obstacles remain valid
+    logical :: kept                                ! whether the lists of obstacles are still valid
     integer(int32) :: i
     integer(int16) :: ix, iy
 
@@ -95,7 +96,7 @@ contains
     end associate
   end subroutine build
 
-  !> Removes all disks from the cells stored in their tags. `all_found` tells whether all cells are then empty.
+  !> Removes each disk from the cell in its tag. If all cells are empty then, `all_found` is .true.
   subroutine clear_cells(self, sim, all_found)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -134,7 +135,7 @@ contains
     end associate
   end subroutine fill_cells
 
-  !> Sets up the neighbour lists of all small disks, if they are expected to save time.
+  !> Sets up the neighbour lists of all small disks, if the lists are expected to save time.
   subroutine list_all(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -170,7 +171,6 @@ contains
     call take(self, tag, i)
   end subroutine take_out
 
-  !> Inserts disk i into a cell without touching the neighbour lists.
   subroutine put(self, tag, i, cell)
     class(cell_grid_t), intent(inout) :: self
     type(tag_t), intent(inout) :: tag
@@ -181,7 +181,6 @@ contains
     call self%cells%insert(self%cells%number(cell), i)
   end subroutine put
 
-  !> Removes disk i from its cell without touching the neighbour lists.
   subroutine take(self, tag, i)
     class(cell_grid_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag
@@ -190,7 +189,7 @@ contains
     call self%cells%remove(self%cells%number(tag%cell), i)
   end subroutine take
 
-  !> Sets up the neighbour list of disk i at its present position, unless the disk has left the block of cells.
+  !> Sets up the neighbour list of disk i at its present position, if the disk is in the block.
   subroutine list(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -201,7 +200,7 @@ contains
     call self%lists%enter(i, self%cells, self%patch, sim%tag(i)%cell)
   end subroutine list
 
-  !> Marks a cell whose disks need the general procedure, because they are big or may touch obstacles, big disks or periodic images.
+  !> Marks a cell that needs the general procedure, near obstacles, big disks or periodic images.
   subroutine mark(self, cell)
     class(cell_grid_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -212,7 +211,7 @@ contains
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
-  !> Updates the reference position of a big disk, and the marks of the cells that it leaves and reaches.
+  !> Updates the reference position of a big disk and the marks of the cells near its rim.
   subroutine follow_big(self, sim, number)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -228,7 +227,7 @@ contains
     end do
   end subroutine follow_big
 
-  !> Executes a cell crossing of disk i (or the expiry of its list or reference position), and predicts its next event.
+  !> Executes a cell crossing of disk i (or the expiry of its list), and predicts its next event.
   subroutine cross(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -257,7 +256,7 @@ contains
     end if
   end subroutine cross_with_care
 
-  !> Moves disk i to the cell behind a face, or to the first cell of the periodic image if the face is a periodic side.
+  !> Moves disk i to the cell behind a face, or to a periodic image if the face is a periodic side.
   subroutine change_cell(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -272,7 +271,8 @@ contains
     cell = sim%tag(i)%cell
     cell(axis) = cell(axis) + int(sense_of(side), int16)
     if (is_wall(code) .and. self%patch%last(axis) > 0) then
-      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)  ! shear displaces the image
+      ! shear displaces the image
+      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)
       cell(axis) = int(merge(self%patch%next(axis), self%patch%last(axis), sense_of(side) > 0), int16)
     end if
     inside = .true.
@@ -281,7 +281,7 @@ contains
     call move(self, sim%tag(i), i, cell)
   end subroutine change_cell
 
-  !> If the cells overlap, reassigns disk i to a cell after a collision.
+  !> After a collision, reassigns disk i to a cell if the cells overlap.
   subroutine choose_cell(self, gravity, disk, tag, i)
     class(cell_grid_t), intent(inout) :: self
     real(real64), intent(in) :: gravity(2)         !! [length/time**2]
@@ -306,7 +306,7 @@ contains
     call put(self, tag, i, cell)
   end subroutine move
 
-  !> Predicts the earliest event of disk i with a side, a cell face, an obstacle, or a disk in the 3 x 3 cells around it.
+  !> Predicts the next event of disk i: a side, a face, an obstacle, or a disk in 3 x 3 cells.
   subroutine predict(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -314,14 +314,14 @@ contains
 
     if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care()) then
       call self%predict_with_care(sim, i, .false.)
-    else if (self%faces%falling) then              ! literal arguments allow the compiler to specialise the procedure
+    else if (self%faces%falling) then      ! literal arguments let the compiler specialise the procedure
       call predict_one(self, sim%box, sim%disk, sim%tag, sim%now, 0, i)
     else
       call predict_one(self, sim%box, sim%disk, sim%tag, sim%now, no_gravity, i)
     end if
   end subroutine predict
 
-  !> Predicts the next events of disks i and j, which have just collided.
+  !> Predicts the next events of disks i and j after their collision.
   subroutine predict_both(self, sim, i, j)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -341,7 +341,7 @@ contains
     end if
   end subroutine predict_both
 
-  !> General version of `predict_both`. The most frequent case is tested first: both disks have complete neighbour lists.
+  !> General version of `predict_both`. The usual case is first: both disks have complete lists.
   subroutine predict_both_with_care(self, sim, i, j)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -360,7 +360,6 @@ contains
     call predict_collided(j)
   contains
 
-    !> Predicts the next event of disk k, which is i or j.
     subroutine predict_collided(k)
       integer(int32), intent(in) :: k
 
@@ -382,7 +381,7 @@ contains
     yes = self%lists%is_short(i) .and. .not. self%patch%at_seam(cell)
   end function is_plainly_listed
 
-  !> Predicts the next events of two disks that have just collided from their neighbour lists.
+  !> Predicts the next events of two disks from their neighbour lists after their collision.
   subroutine predict_listed(self, sim, i, j)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
@@ -391,7 +390,7 @@ contains
 
     call survey_list(self, sim%box, sim%disk(i), sim%now, i, near_i)
     call survey_list(self, sim%box, sim%disk(j), sim%now, j, near_j)
-    if (self%faces%falling) then                   ! literal arguments allow the compiler to specialise the procedure
+    if (self%faces%falling) then      ! literal arguments let the compiler specialise the procedure
       call take_earliest(sim%box%gravity, sim%disk, sim%tag, sim%now, latest_clock, near_i)
       call take_earliest(sim%box%gravity, sim%disk, sim%tag, sim%now, latest_clock, near_j)
     else
@@ -400,7 +399,7 @@ contains
     end if
   end subroutine predict_listed
 
-  !> Finds when disk i leaves its neighbourhood, and copies its neighbour list.
+  !> Determines when disk i leaves its neighbourhood, and copies its neighbour list.
   pure subroutine survey_list(self, box, disk, now, i, near)
     type(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -416,7 +415,7 @@ contains
     call self%lists%copy_list(near)
   end subroutine survey_list
 
-  !> Predicts the next events of two disks in unmarked cells. All candidates are collected before the first is tested.
+  !> Predicts the next events of two disks in unmarked cells, after collecting all candidates.
   subroutine predict_two(self, box, disk, tag, now, known, pair)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -435,7 +434,7 @@ contains
     call take_earliest(box%gravity, disk, tag, now, known, second)
   end subroutine predict_two
 
-  !> Predicts the next event of one disk in an unmarked cell.
+  !> Predicts the next event of a disk in an unmarked cell.
   subroutine predict_one(self, box, disk, tag, now, known, i)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -450,7 +449,7 @@ contains
     call take_earliest(box%gravity, disk, tag, now, known, near)
   end subroutine predict_one
 
-  !> Finds the time at which a disk leaves its cell, and collects the candidates for a collision before that time.
+  !> Finds when a disk leaves its cell, and collects the candidates for a collision until then.
   subroutine survey(self, box, disk, tag, now, known, near)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
@@ -477,10 +476,11 @@ contains
     call earliest_contact(disk, tag, near, now, gravity, known)
     disk(near%disk)%event_time = near%time
     disk(near%disk)%partner = near%partner
-    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter  ! used only if the partner is a disk
+    ! used only if the partner is a disk
+    tag(near%disk)%partner_counter = disk(max(near%partner, 1))%collision_counter
   end subroutine take_earliest
 
-  !> Prefetches, in several stages, the data needed to predict the events of some disks.
+  !> Prefetches, in several stages, the data for predicting the events of several disks.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -494,12 +494,12 @@ contains
     end if
   end subroutine read_ahead
 
-  !> Predicts the next event of a disk in the general case. A disk that has left the block of cells is removed from the search.
+  !> General version of `predict`. A disk that has left the block is removed from the search.
   subroutine predict_with_care(self, sim, i, has_collided)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    logical, intent(in) :: has_collided            !! whether disk i has just collided, which gives it the latest of all clocks
+    logical, intent(in) :: has_collided   !! whether disk i has just collided, so that its clock is the latest
     type(prediction_t) :: near
     integer(int32) :: known                        ! as in `earliest_contact`
 
@@ -520,7 +520,7 @@ contains
     sim%tag(i)%partner_counter = sim%disk(max(near%partner, 1))%collision_counter
   end subroutine predict_with_care
 
-  !> Finds the earliest event of a big disk: a contact, or its departure from the margin around its reference position.
+  !> Finds the next event of a big disk: a contact, or leaving the margin around its old position.
   subroutine find_event_of_big(self, sim, known, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -542,7 +542,7 @@ contains
     end associate
   end subroutine find_event_of_big
 
-  !> Finds the earliest event of a small disk, which may have a neighbour list.
+  !> Finds the next event of a small disk, with or without a neighbour list.
   subroutine find_event_of_small(self, sim, known, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -1,4 +1,4 @@
-!> Chooses the width of the cells for the cell search.
+!> Chooses the width of the cells of the search.
 module cell_layout
   use kinds, only: int32, never, real64
   use cell_faces, only: all_cells, patch_t
@@ -9,13 +9,14 @@ module cell_layout
   private
   public :: whole_box
 
-  !> With fewer disks per cell, predictions test fewer candidates, but disks cross cells more often.
-  real(real64), parameter :: disks_per_cell = 0.6_real64    !! intended mean number of disks per cell in a dilute system
+  !> With fewer disks per cell, a prediction tests fewer candidates, but disks cross cells more
+  !> often. Intended mean number of disks per cell in a dilute system.
+  real(real64), parameter :: disks_per_cell = 0.6_real64
 
 contains
 
-  !> Chooses the cells for all disks and obstacles of a simulation. In the number of disks per cell,
-  !> obstacles count as disks, because each disk is also tested against the obstacles in its cell.
+  !> Chooses the cells for all disks and obstacles of a simulation. Obstacles count as disks,
+  !> because each disk is also tested against the obstacles in its cell.
   pure function whole_box(sim, undivided) result(patch)
     type(simulation_t), intent(in) :: sim
     logical, intent(in) :: undivided

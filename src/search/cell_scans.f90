@@ -1,6 +1,6 @@
-!> Finds contacts beyond the reach of the simple search of 3 x 3 cells: with disks in the linked
-!> lists of crowded cells, with disks across a periodic side, with obstacles and big disks, and with
-!> given disks.
+!> Contacts that the simple search of 3 x 3 cells does not find: with disks in the linked lists of
+!> crowded cells, with disks across a periodic side, with obstacles and big disks, and with given
+!> disks.
 module cell_scans
   use kinds, only: int32, int64, real64
   use box_geometry, only: find_image_contact, stays_clear
@@ -18,8 +18,8 @@ module cell_scans
 
 contains
 
-  !> Tests and then discards the candidates in `near`. The literal arguments of `earliest_contact`
-  !> let the compiler generate specialised versions.
+  !> Tests the candidates in `near` and empties the list. With literal arguments of
+  !> `earliest_contact`, the compiler generates specialised versions.
   subroutine test_list(sim, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
@@ -39,8 +39,8 @@ contains
     near%n = 0
   end subroutine test_list
 
-  !> Tests and then discards the candidates in `near`, all of which belong to one periodic image of
-  !> the box.
+  !> Tests the candidates in `near`, all in the same periodic image of the box, and empties the
+  !> list.
   subroutine test_through_image(sim, known, image, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known
@@ -60,7 +60,7 @@ contains
     near%n = 0
   end subroutine test_through_image
 
-  !> Finds contacts with given disks, all of which belong to one periodic image of the box.
+  !> Finds contacts with given disks, all in the same periodic image of the box.
   subroutine scan_disks(sim, disks, image, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: disks(:)
@@ -84,10 +84,11 @@ contains
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prediction_t), intent(inout) :: near
-    type(entry_t) :: entry                         ! copied, because the compiler keeps a local record in registers
-    integer(int32) :: next                         ! index of the next entry
-    integer(int32) :: last(2)                      ! periodic image that contains the candidates in `near`
-    real(real64) :: number(2), shift(2)            ! index of the image of an obstacle; shift to this image [length]
+    type(entry_t) :: entry                         ! the compiler keeps a local copy in registers
+    integer(int32) :: next                         ! index of the next list entry
+    integer(int32) :: last(2)                      ! periodic image of the candidates in `near`
+    ! index of an obstacle's image; shift to this image [length]
+    real(real64) :: number(2), shift(2)
     logical :: falling                             ! whether gravity acts on the disks
 
     near%n = 0
@@ -113,8 +114,7 @@ contains
     if (near%n > 0) call test_disks()
   contains
 
-    !> Tests the big disks among the candidates, all of which belong to one periodic image of the
-    !> box.
+    !> Tests the big disks among the candidates, all in the same periodic image of the box.
     subroutine test_disks()
       if (all(last == 0)) then
         call test_list(sim, known, near)
@@ -149,14 +149,13 @@ contains
     end do
   end subroutine scan_list
 
-  !> Finds contacts with the disks in given cells, all of which belong to one periodic image of the
-  !> box.
+  !> Finds contacts with the disks in given cells, all in the same periodic image of the box.
   subroutine scan_cells(cells, sim, c, images, number, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: c(:)             !! numbers of up to nine cells
     type(images_t), intent(in) :: images
-    real(real64), intent(in) :: number(2)          !! index of the image to which the cells belong
+    real(real64), intent(in) :: number(2)          !! index of the image that contains the cells
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prediction_t), intent(inout) :: near
     integer(int64) :: n
@@ -173,14 +172,14 @@ contains
     if (near%n > 0) call test_through_image(sim, known, images%image(number), near)
   end subroutine scan_cells
 
-  !> Adds to the candidates the disks in the linked list of a crowded cell; the first of them is
+  !> Adds the disks in the linked list of a crowded cell to the candidates. The first of them is
   !> also in a slot.
   subroutine add_chain(cells, sim, c, images, number, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: c                !! number of the cell
     type(images_t), intent(in) :: images
-    real(real64), intent(in) :: number(2)          !! index of the image to which the cell belongs
+    real(real64), intent(in) :: number(2)          !! index of the image that contains the cell
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
     type(prediction_t), intent(inout) :: near
     integer(int32) :: j
@@ -195,8 +194,8 @@ contains
     end do
   end subroutine add_chain
 
-  !> Finds contacts of a big disk with small disks in the cells along its boundary. Cells of the
-  !> same periodic image are searched together.
+  !> Finds contacts of a big disk with small disks in the cells along its rim. Cells of the same
+  !> periodic image are searched together.
   subroutine scan_rim(cells, sim, rim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -218,8 +217,8 @@ contains
     end do
   end subroutine scan_rim
 
-  !> Adds to the candidates found by `gather` the disks in linked lists: those of the crowded cells
-  !> among the cell of a disk and its eight neighbours.
+  !> Adds disks in linked lists to the candidates found by `gather`, for the crowded cells among the
+  !> cell of a disk and its eight neighbours.
   subroutine add_chains_around(cells, sim, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -229,8 +228,8 @@ contains
 
     do row = near%cell - cells%stride, near%cell + cells%stride, cells%stride
       do c = row - 1, row + 1
-        ! The first disk of a linked list is also in a slot and already a candidate, unless `gather`
-        ! left it out.
+        ! The first disk of a linked list is also in a slot, and is already a candidate unless
+        ! `gather` left it out.
         j = cells%chain(c)
         if (j > 0 .and. c /= near%cell) j = cells%next(j)
         do while (j > 0)
@@ -243,9 +242,9 @@ contains
     end do
   end subroutine add_chains_around
 
-  !> Finds contacts of a disk near a periodic side, across which some of the 3 x 3 cells around it
-  !> lie. Cells of the same periodic image are searched together. In sheared boxes, where the images
-  !> above and below move along x, `scan_around_moving_seam` is used instead.
+  !> Finds contacts of a disk near a periodic side, beyond which some of the 3 x 3 cells around it
+  !> lie. Cells of the same periodic image are searched together. A sheared box, whose images above
+  !> and below move along x, requires `scan_around_moving_seam` instead.
   subroutine scan_around_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
@@ -277,7 +276,7 @@ contains
     end do
   contains
 
-    !> Last of the adjacent rows or columns that belong to the same image as the given one.
+    !> Last of the adjacent rows or columns in the same image as a given one.
     pure function last_alike(image, first) result(last)
       integer(int32), intent(in) :: image(-1:1), first
       integer(int32) :: last
@@ -287,7 +286,7 @@ contains
       if (first < 0 .and. image(1) == image(first)) last = 1
     end function last_alike
 
-    !> Tests the disks in a block of cells that all belong to the same periodic image.
+    !> Tests the disks in a block of cells, all in the same periodic image.
     subroutine scan_block()
       integer(int64) :: n
       integer(int32) :: c, k, m, fullest
@@ -320,8 +319,8 @@ contains
     end subroutine scan_block
   end subroutine scan_around_seam
 
-  !> Version of `scan_around_seam` for sheared boxes, whose images above and below move along x. Six
-  !> columns of these images are searched instead of three, so that no contact is missed before the
+  !> Version of `scan_around_seam` for sheared boxes, whose images above and below move along x. In
+  !> these images six columns are searched instead of three, so that no contact is missed before the
   !> images have moved by the width of a column.
   subroutine scan_around_moving_seam(cells, patch, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells

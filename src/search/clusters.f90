@@ -1,14 +1,16 @@
-!> Decides whether the collisions of a few disks that almost touch each other come to an end, or whether their number is unbounded
-!> (inelastic collapse).
+!> Decides whether the collisions of a few disks that almost touch each other end, or whether their
+!> number is unbounded (inelastic collapse).
 !>
-!> The disks of such a cluster move so little that the normals of their contacts hardly change. Instead of positions and
-!> velocities, the state of a cluster consists of the gap of each contact and the velocity at which the gap closes. In a collapse
-!> these numbers decrease by hundreds of powers of ten. They remain exact to rounding, whereas differences of positions would soon
-!> be lost in the rounding errors of the positions themselves.
+!> The disks of such a cluster move so little that the normals of their contacts hardly change. The
+!> state of the cluster is therefore described not by positions and velocities but by the gap of
+!> each contact and the velocity at which the gap closes. In a collapse these numbers decrease by
+!> hundreds of powers of ten. They remain exact to rounding, whereas differences of positions would
+!> soon be smaller than the rounding errors of the positions.
 !>
-!> Motion along the surfaces is included to first order. Two disks at the distance r, slipping past each other with the velocity w,
-!> separate with the acceleration w**2/r (Zhou and Kadanoff, Physical Review E 54, 623 (1996)). The normal of their contact turns at
-!> the angular velocity w/r, which matters only for the tangential impulses of rough disks.
+!> Motion along the surfaces is included to first order. Two disks at a distance r that slip past
+!> each other with velocity w separate with the acceleration w**2/r (Zhou and Kadanoff, Physical
+!> Review E 54, 623 (1996)). The normal of their contact turns with the angular velocity w/r, which
+!> matters only for the tangential impulses of rough disks.
 module clusters
   use kinds, only: int32, real64
   use collisions, only: speed_law_t, tangential_impulse, tangential_law_t
@@ -16,37 +18,44 @@ module clusters
   private
   public :: cluster_t, contact_t, most_disks
 
-  integer(int32), parameter :: most_disks = 40       !! largest number of disks in a cluster
-  !> A series is considered unbounded if it has more than `longest` collisions per square of the number of colliding disks
-  !> (`longest_rough` for rough disks), or if its closing velocities have decreased by the factor `slowest`. Except within about 1 %
-  !> of a limit of collapse, finite series are shorter and slow down less.
+  integer(int32), parameter :: most_disks = 40       !! maximum number of disks in a cluster
+  !> A series of collisions is considered unbounded if there are more than `longest` collisions
+  !> (`longest_rough` for rough disks) times the square of the number of colliding disks, or if the
+  !> closing velocities have decreased by the factor `slowest`. Finite series are shorter and slow
+  !> down less, except within about 1 % of a limit of collapse.
   integer, parameter :: longest = 24, longest_rough = 240
   real(real64), parameter :: slowest = 1.0e-200_real64
-  !> Largest angle between the normals of a row of disks that is straight except for rounding errors, which must not end its
-  !> collapse.
+  !> Maximum angle between the contact normals of a row of disks that is straight except for
+  !> rounding errors. These errors must not end the collapse of the row.
   real(real64), parameter :: straight = 2.0_real64**(-33)
 
-  !> A contact of two disks, or of a disk with a side or an obstacle. Its tangent is its normal, turned by -90 degrees.
+  !> A contact of two disks, or of a disk with a side or an obstacle. Its tangent is the normal
+  !> turned by -90 degrees.
   type :: contact_t
-    integer(int32) :: first = 0                      !! number of a disk in the cluster
-    integer(int32) :: second = 0                     !! number of the other disk in the cluster; 0 for a side or an obstacle
+    integer(int32) :: first = 0                      !! index of a disk in the cluster
+    integer(int32) :: second = 0      !! index of the other disk in the cluster; 0 for a side or an obstacle
     real(real64) :: normal(2) = 0.0_real64           !! unit vector from the first disk to its partner
     real(real64) :: distance = huge(1.0_real64)      !! distance between the centres of two disks [length]
     real(real64) :: gap = 0.0_real64                 !! distance between the surfaces [length]
     real(real64) :: closing = 0.0_real64             !! velocity at which the gap closes [length/time]
-    real(real64) :: sliding = 0.0_real64             !! tangential velocity of the partner relative to the first disk [length/time]
-    real(real64) :: slip = 0.0_real64                !! tangential velocity of the first surface relative to the other [length/time]
-    real(real64) :: turn = 0.0_real64                !! angle by which the normal has turned towards the tangent
+    !> Tangential velocity of the partner relative to the first disk [length/time].
+    real(real64) :: sliding = 0.0_real64
+    !> Tangential velocity of the first surface relative to the other [length/time].
+    real(real64) :: slip = 0.0_real64
+    real(real64) :: turn = 0.0_real64      !! angle by which the normal has turned towards the tangent
     real(real64) :: restitution = 1.0_real64
     type(speed_law_t) :: by_speed = speed_law_t()
     type(tangential_law_t) :: tangential = tangential_law_t()
   end type contact_t
 
-  !> Changes of each contact (first index) per impulse of another contact (second index). [1/mass]
+  !> Velocity changes at each contact (first index) per unit impulse at another contact (second
+  !> index) [1/mass].
   type :: couplings_t
-    real(real64), allocatable :: along(:, :)         !! of a velocity along the normal (tangent) by a normal (tangential) impulse
-    real(real64), allocatable :: across(:, :)        !! of a velocity along the tangent by a normal impulse
-    real(real64), allocatable :: rims(:, :)          !! of the velocities of rotating surfaces by a tangential impulse
+    !> Normal (tangential) velocity change by a normal (tangential) impulse.
+    real(real64), allocatable :: along(:, :)
+    real(real64), allocatable :: across(:, :)        !! tangential velocity change by a normal impulse
+    !> Tangential velocity change of rotating surfaces by a tangential impulse.
+    real(real64), allocatable :: rims(:, :)
   end type couplings_t
 
   type :: cluster_t
@@ -63,12 +72,13 @@ module clusters
 
 contains
 
-  !> Follows the collisions until they end, the time limit is reached, or their number is known to be unbounded.
+  !> Follows the collisions of a cluster until they end, the time limit is reached, or their number
+  !> is known to be unbounded.
   pure subroutine follow(self, limit, endless, duration, events)
     class(cluster_t), intent(inout) :: self
     real(real64), intent(in) :: limit                !! [time]
     logical, intent(out) :: endless                  !! whether the number of collisions is unbounded
-    real(real64), intent(out) :: duration            !! time of the last collision, or of the limit point of a collapse [time]
+    real(real64), intent(out) :: duration   !! time of the last collision, or limit point of a collapse [time]
     integer, intent(out) :: events(most_disks)       !! number of collisions of each disk
     type(couplings_t) :: coupling
     real(real64) :: slow, s, earliest                ! [length/time], [time], [time]
@@ -107,7 +117,7 @@ contains
     endless = .true.
   end subroutine follow
 
-  !> Moves the disks for the time s.
+  !> Advances the disks by the time s.
   pure subroutine advance(self, s)
     class(cluster_t), intent(inout) :: self
     real(real64), intent(in) :: s                    !! [time]
@@ -128,7 +138,8 @@ contains
     type(couplings_t), intent(in) :: coupling
     integer, intent(in) :: next
     real(real64) :: across(size(self%contact))       ! [1/mass]
-    real(real64) :: mass, velocity, normal, tangential   ! reduced mass [mass], [length/time], impulses [mass length/time]
+    ! reduced mass [mass], [length/time], impulses [mass length/time]
+    real(real64) :: mass, velocity, normal, tangential
 
     associate (contact => self%contact, along => coupling%along(:, next))
       mass = 1/coupling%along(next, next)
@@ -144,11 +155,11 @@ contains
     end associate
   end subroutine collide
 
-  !> The couplings of all contacts.
+  !> Couplings between all contacts.
   pure function couplings(self) result(coupling)
     class(cluster_t), intent(in) :: self
     type(couplings_t) :: coupling
-    real(real64) :: shared(2), sine                  ! [1/mass], of the angle between the normals
+    real(real64) :: shared(2), sine                  ! 1/mass [1/mass]; sine of the angle between the normals
     integer :: e, f
 
     associate (n => size(self%contact))
@@ -168,7 +179,8 @@ contains
     end associate
   contains
 
-    !> Reciprocal mass of a disk shared by two contacts, with and without the sign; 0 if they share none.
+    !> Inverse mass of the disk shared by two contacts, with and without its sign; 0 if the contacts
+    !> share no disk.
     pure function term(i, j, sign)
       integer(int32), intent(in) :: i, j             !! numbers of the disks
       integer, intent(in) :: sign

@@ -1,10 +1,12 @@
-!> Detects inelastic collapses (unbounded numbers of collisions in a finite time), and counts collisions at exactly the same time.
+!> Detects inelastic collapses, in which an unbounded number of collisions occurs in a finite time,
+!> and counts collisions at exactly the same time.
 !>
-!> A collision may belong to a collapse if the gap between the two disks was negligible even before they approached each other. The
-!> simulation itself cannot decide: near a limit of collapse, rounding errors of the positions, or of a common velocity, determine
-!> the motion before time stops advancing. The disks that almost touch are therefore copied to a cluster, whose collisions are
-!> followed without such errors (see `clusters`). The verdict depends only on the state at the collision, not on the search, the
-!> number of threads or the pauses of the run.
+!> A collision may be part of a collapse if the gap between the two disks was negligible even before
+!> they approached each other. The simulation alone cannot decide this: near a limit of collapse,
+!> rounding errors of the positions, or of a common velocity, dominate the motion before time stops
+!> advancing. The disks that almost touch are therefore copied to a cluster, whose collisions are
+!> followed without such errors (see `clusters`). The decision depends only on the state at the
+!> collision, and not on the search, the number of threads or the pauses of the run.
 module collapses
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: tangential_surface_velocity, wall_normal
@@ -19,26 +21,27 @@ module collapses
   private
   public :: still, watch
 
-  !> A collision is examined if the two disks have hardly moved since the later of their previous events: neither their relative
-  !> displacement nor the decrease of their gap may exceed these values. [sum of the radii]
+  !> A collision is examined if the two disks have hardly moved since the later of their previous
+  !> events. In units of the sum of the radii, these are the maximum relative displacement and the
+  !> maximum decrease of the gap.
   real(real64), parameter :: still = 2.0_real64**(-14), negligible = 2.0_real64**(-33)
-  !> Smallest decrease of a gap, and smallest sliding velocity, above the level of rounding errors [spacing of the coordinates, or
-  !> of the velocities]
+  !> Minimum decrease of a gap, and minimum sliding velocity, that exceed the rounding errors, in
+  !> units of the spacing of the floating-point coordinates or velocities.
   real(real64), parameter :: resolved = 4.0_real64
-  !> Largest gap between neighbouring disks of a cluster, and between any disk of the cluster and the colliding disks [sum of the
-  !> radii]
+  !> Maximum gap between neighbouring disks of a cluster, and between any disk of the cluster and
+  !> the colliding disks, in units of the sum of the radii.
   real(real64), parameter :: reach = 0.125_real64, farthest = 16.0_real64
 
 contains
 
-  !> Examines the collision of disks i and j at the time t before it is executed.
+  !> Examines the collision of disks i and j at the time t, before the collision is executed.
   subroutine watch(sim, i, j, t, is_part)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
-    logical, intent(in) :: is_part                   !! whether `sim` is a domain, which may lack disks of the cluster
+    logical, intent(in) :: is_part      !! whether `sim` is a domain, which may lack disks of the cluster
     real(real64) :: s, dx(2), dv(2)
-    logical :: is_resolved                           ! whether rounding errors are smaller than the decrease of the gap
+    logical :: is_resolved                           ! whether the decrease of the gap exceeds rounding errors
 
     associate (p => sim%disk(i), q => sim%disk(j))
       s = t - max(p%clock, q%clock)
@@ -64,19 +67,19 @@ contains
       if (is_resolved .or. any(events > known)) then
         call judge(sim, i, j, t, is_resolved)
       else
-        ! The series has outlived its prediction, because rounding errors now determine the gaps.
+        ! The series is longer than predicted, because rounding errors now determine the gaps.
         sim%series(sim%tag([i, j])%id)%known_until = events + 1
       end if
     end associate
   end subroutine watch
 
-  !> Adds a collision to its series: the collisions at one and the same time that are connected by shared disks. The first two
-  !> collisions of a series are added together.
+  !> Adds a collision to its series. A series consists of collisions at one and the same time that
+  !> are connected by common disks. Its first two collisions are added together.
   subroutine count_collision(sim, i, j, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
-    integer(int32) :: first, second                  ! in the order of their ids, not of memory, so that checkpoints agree
+    integer(int32) :: first, second      ! in the order of ids, not of memory, for identical checkpoints
 
     if (.not. min(sim%disk(i)%clock, sim%disk(j)%clock) < t) sim%tally%simultaneous = sim%tally%simultaneous + 1
     first = merge(i, j, sim%tag(i)%id < sim%tag(j)%id)
@@ -86,8 +89,8 @@ contains
     call unite(sim%tag(first)%id, sim%tag(second)%id)
   contains
 
-    !> Starts a series with disk k, unless the disk already belongs to a series at this time. If disk k has already collided at this
-    !> time, the collision with its last partner is added.
+    !> Starts a series with disk k, unless the disk already belongs to a series at this time. If
+    !> disk k has already collided at this time, the collision with its last partner is added.
     subroutine join(k)
       integer(int32), intent(in) :: k
 
@@ -100,7 +103,7 @@ contains
       end associate
     end subroutine join
 
-    !> Starts a series that consists of one disk.
+    !> Starts a series with a single disk.
     subroutine begin(id)
       integer(int32), intent(in) :: id
 
@@ -112,7 +115,7 @@ contains
       end associate
     end subroutine begin
 
-    !> Adds a collision of the disks with the ids a and b, merging their series.
+    !> Adds a collision of the disks with the ids a and b to their series, which are merged.
     subroutine unite(a, b)
       integer(int32), intent(in) :: a, b
       integer(int32) :: root, other
@@ -137,15 +140,16 @@ contains
 
       root = id
       do while (sim%series(root)%root /= root)
-        sim%series(root)%root = sim%series(sim%series(root)%root)%root     ! shortens later searches
+        sim%series(root)%root = sim%series(sim%series(root)%root)%root     ! shortens later look-ups
         root = sim%series(root)%root
       end do
     end function root_of
   end subroutine count_collision
 
-  !> Determines whether the collisions of disks i and j, and of the disks around them, are a collapse. If their number is finite,
-  !> the disks are not examined again before they have collided as often as predicted. If rounding errors determine the gaps, the
-  !> number of collisions until the next examination doubles each time.
+  !> Decides whether the collisions of disks i and j and of the disks around them are a collapse. If
+  !> the number of collisions is finite, the disks are not examined again until they have collided
+  !> as often as predicted. If rounding errors determine the gaps, the number of collisions until
+  !> the next examination doubles each time.
   subroutine judge(sim, i, j, t, is_resolved)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -176,13 +180,13 @@ contains
   end subroutine judge
 
   !> Lists the disks of the cluster around disks i and j, in the order of their ids: all disks
-  !> connected with i through gaps of at most `reach`.
+  !> connected with disk i by gaps of at most `reach`.
   subroutine find_members(sim, i, j, t, member, n)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
     integer(int32), intent(out) :: member(most_disks), n
-    integer(int32), allocatable :: near(:)           ! indices of the disks close to disk i
+    integer(int32), allocatable :: near(:)           ! indices of the disks near disk i
     logical, allocatable :: found(:)
     integer(int32) :: k, m, first
 
@@ -243,7 +247,7 @@ contains
     end do
   contains
 
-    !> Contact of two disks of the cluster.
+    !> Contact between two disks of the cluster.
     function contact_of(a, b) result(contact)
       integer(int32), intent(in) :: a, b
       type(contact_t) :: contact
@@ -262,7 +266,8 @@ contains
       contact%sliding = contact%normal(2)*dv(1) - contact%normal(1)*dv(2)
       associate (p => sim%disk(member(a)), q => sim%disk(member(b)))
         contact%slip = -contact%sliding - p%radius*sim%spin(member(a)) - q%radius*sim%spin(member(b))
-        ! The collapse of a straight row must not be ended by rounding errors of a common velocity or of a fall.
+        ! Rounding errors of a common velocity, or of a fall, must not end the collapse of a
+        ! straight row.
         noise = spacing(maxval(abs([p%v, q%v]))) + magnitude(dv)/distance*spacing(maxval(abs([p%x, q%x])))
         if (abs(contact%sliding) <= resolved*noise) contact%sliding = 0
       end associate
@@ -272,8 +277,8 @@ contains
     end function contact_of
   end subroutine list_contacts
 
-  !> Contacts with sides and obstacles of disk i, whose number in the cluster is `number`. A curved
-  !> surface is replaced by its tangent, and a thermal wall by an elastic one.
+  !> Contacts of disk i with sides and obstacles, where `number` is the index of the disk in the
+  !> cluster. A curved surface is replaced by its tangent, and a thermal wall by an elastic one.
   function surface_contacts(sim, t, i, number) result(contacts)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: t
@@ -303,10 +308,10 @@ contains
     end do
   contains
 
-    !> Adds a contact if its gap is not too large.
+    !> Adds a contact if its gap is small enough.
     subroutine add(code, gap, normal, velocity)
       integer(int32), intent(in) :: code             !! see `partners`
-      real(real64), intent(in) :: gap, normal(2)     !! [length], unit vector towards the surface
+      real(real64), intent(in) :: gap, normal(2)     !! gap [length] and unit vector towards the surface
       real(real64), intent(in) :: velocity           !! velocity of the surface towards the disk [length/time]
       type(contact_t) :: contact
 

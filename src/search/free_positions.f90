@@ -1,4 +1,4 @@
-!> Random free positions in a region, for disks that are recycled or that enter the box.
+!> Free positions in a region, chosen at random, for disks that are recycled or enter the box.
 module free_positions
   use kinds, only: int32, real64
   use box_geometry, only: box_t
@@ -12,7 +12,7 @@ module free_positions
   private
   public :: check_cover, check_obstacles, check_region, check_room, find_position, present_packing
 
-  !> Largest number of random positions that are tried for one disk at one time.
+  !> Maximum number of random positions tried for one disk at one time.
   integer, parameter :: most_trials = 100
 
 contains
@@ -52,15 +52,16 @@ contains
       //written(2*radius)//" needs more room; the region is "//written(edges(1))//" x "//written(edges(2)))
   end subroutine check_room
 
-  !> Reports an obstacle that disks in a region can touch.
+  !> Reports an obstacle that disks in the region can touch.
   subroutine check_obstacles(fields, name, region, box, radius)
     class(fields_t), intent(inout) :: fields
     character(len=*), intent(in) :: name
     real(real64), intent(in) :: region(4)                    !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: radius                       !! largest radius of the disks [length]
-    real(real64), parameter :: nearly = 1 - 1.0e-4_real64    ! factor below 1, because a region may touch an obstacle
-    real(real64) :: middle(2), half(2)  ! centre and half edges of the rectangle for the centres of disks [length]
+    real(real64), parameter :: nearly = 1 - 1.0e-4_real64    ! below 1, because a region may touch an obstacle
+    ! centre and half edges of the rectangle for the centres of the disks [length]
+    real(real64) :: middle(2), half(2)
     integer :: k
 
     middle = 0.5_real64*(region([1, 3]) + region([2, 4]))
@@ -90,13 +91,14 @@ contains
     end do
   end subroutine check_cover
 
-  !> Whether a disk with its centre in a rectangle can touch an obstacle, or the obstacle excludes disks from the whole rectangle.
+  !> True if a disk with its centre in a rectangle can touch an obstacle. With the argument
+  !> `wholly`, true only if the obstacle excludes disks from the whole rectangle.
   pure function is_in_the_way(box, m, middle, half, radius, wholly) result(yes)
     type(box_t), intent(in) :: box
     integer, intent(in) :: m                                  !! index of the obstacle
-    real(real64), intent(in) :: middle(2), half(2)            !! centre and half edges of the rectangle [length]
+    real(real64), intent(in) :: middle(2), half(2)      !! centre and half edges of the rectangle [length]
     real(real64), intent(in) :: radius                        !! [length]
-    logical, intent(in), optional :: wholly                   !! if present, only a whole excluded rectangle counts
+    logical, intent(in), optional :: wholly      !! if present, only exclusion from the whole rectangle counts
     logical :: yes
     real(real64) :: d(2)
     integer :: last(2), kx, ky
@@ -115,13 +117,13 @@ contains
     end associate
   end function is_in_the_way
 
-  !> A packing of the disks in the box at their present positions, with space for further disks.
+  !> Packing of the disks in the box at their present positions, with space for further disks.
   function present_packing(sim, region, more) result(packing)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: region(4)                    !! xlo, xhi, ylo, yhi [length]
-    integer, intent(in) :: more                              !! largest number of further disks
+    integer, intent(in) :: more                              !! maximum number of further disks
     type(packing_t) :: packing
-    real(real64), allocatable :: x(:, :)                     ! (2,n) present positions [length]
+    real(real64), allocatable :: x(:, :)                     ! present positions; shape (2, n) [length]
     integer(int32) :: i
 
     allocate (x(2, sim%n_disks()))
@@ -138,7 +140,7 @@ contains
     end do
   end function present_packing
 
-  !> Draws random positions in a region until a disk with the given radius fits at one of them.
+  !> Draws random positions in a region until a disk of the given radius fits.
   pure subroutine find_position(region, sim, packing, radius, stream, x, free)
     real(real64), intent(in) :: region(4)                    !! xlo, xhi, ylo, yhi [length]
     type(simulation_t), intent(in) :: sim
@@ -146,12 +148,12 @@ contains
     real(real64), intent(in) :: radius                       !! [length]
     type(random_stream_t), intent(inout) :: stream
     real(real64), intent(out) :: x(2)                        !! [length]
-    logical, intent(out) :: free                             !! .false. if none of the tried positions is free
+    logical, intent(out) :: free                             !! .false. if no free position was found
     real(real64) :: lower(2), upper(2), u(2)
     integer(int32) :: blocker
     integer :: trial
 
-    ! A moving side may leave no space for the disk; `upper` then equals `lower` along the axis of that side.
+    ! A moving side may leave no space for the disk; along its axis, `upper` then equals `lower`.
     call centre_range(region, sim%box, radius, lower, upper, sim%now)
     free = .false.
     x = lower

@@ -1,7 +1,6 @@
-!> Grids of equal cells for searches outside the event loop: for placing disks, finding obstacles
-!> near a point, time steps, and sorting disks in memory. The event loop has its own grid of
-!> overlapping cells (`cell_faces`). Both grids use the lists of objects in cells that are defined
-!> here.
+!> Grids of equal cells for searches outside the event loop: the placement of disks, obstacles near
+!> a point, time steps, and the sorting of disks in memory. The event loop uses a separate grid of
+!> overlapping cells (`cell_faces`). Both grids use the lists of objects in cells defined here.
 module grid
   use kinds, only: int32, real64
   implicit none
@@ -11,8 +10,8 @@ module grid
   type :: grid_t
     integer(int32) :: n(2) = 0                      !! numbers of columns and rows
     real(real64) :: lower(2) = 0.0_real64           !! lower left corner [length]
-    real(real64) :: extent(2) = 1.0_real64          !! edges; 1 in place of 0 [length]
-    real(real64) :: density(2) = 0.0_real64         !! number of cells per length along each axis [1/length]
+    real(real64) :: extent(2) = 1.0_real64          !! edges; 1 if an edge is 0 [length]
+    real(real64) :: density(2) = 0.0_real64         !! number of cells per length, for each axis [1/length]
   contains
     procedure :: divide
     procedure, non_overridable :: in_cells
@@ -20,17 +19,17 @@ module grid
     procedure :: block
   end type grid_t
 
-  !> An entry in the list of a cell: an obstacle or a big disk.
+  !> Entry in the list of a cell: an obstacle or a big disk.
   type :: entry_t
-    integer(int32) :: code = 0                      !! index of a disk (> 0), or boundary id of an obstacle (<= 0)
+    integer(int32) :: code = 0      !! index of a disk (> 0), or boundary id of an obstacle (<= 0)
     integer(int32) :: image(2) = 0                  !! index of the periodic image that reaches into the cell
-    integer(int32) :: next = 0                      !! next entry in the same list; 0 at the end of the list
+    integer(int32) :: next = 0                      !! next entry in the same list; 0 at the end
   end type entry_t
 
   !> Lists of the objects that reach into each cell.
   type :: cell_lists_t
-    !> (columns,rows) first entry in the list of each cell; 0 for an empty list. Not allocated if
-    !> there are no objects.
+    !> First entry in the list of each cell; 0 for an empty list; shape (columns, rows). Not
+    !> allocated without objects.
     integer(int32), allocatable :: first(:, :)
     type(entry_t), allocatable :: entry(:)
     integer(int32), private :: vacant = 0           !! first entry in the list of free entries
@@ -65,8 +64,8 @@ contains
     position = (p - self%lower)/self%extent*self%n
   end function in_cells
 
-  !> Column and row, counted from 1, of the cell that contains a point, or of the nearest cell if
-  !> the point is outside the grid.
+  !> Column and row, counted from 1, of the cell that contains a point. If the point is outside the
+  !> grid, the nearest cell is returned.
   pure function cell(self, p) result(c)
     class(grid_t), intent(in) :: self
     real(real64), intent(in) :: p(2)                !! [length]
@@ -80,7 +79,7 @@ contains
   pure function block(self, p, reach) result(corner)
     class(grid_t), intent(in) :: self
     real(real64), intent(in) :: p(2), reach         !! [length]
-    integer(int32) :: corner(2, 2)                  !! (axis, 1: first, 2: last cell)
+    integer(int32) :: corner(2, 2)                  !! shape (axis, first or last cell)
 
     corner(:, 1) = self%cell(p - reach)
     corner(:, 2) = self%cell(p + reach)
@@ -89,7 +88,7 @@ contains
   !> Splits a block of several cells into two halves along its longer axis.
   pure subroutine split_block(low, high, last, first)
     integer(int32), intent(in) :: low(2), high(2)   !! first and last cell of the block
-    integer(int32), intent(out) :: last(2)          !! last cell of the half that begins with `low`
+    integer(int32), intent(out) :: last(2)          !! last cell of the half that starts with `low`
     integer(int32), intent(out) :: first(2)         !! first cell of the half that ends with `high`
     integer(int32) :: axis
 
@@ -100,7 +99,7 @@ contains
     first(axis) = last(axis) + 1
   end subroutine split_block
 
-  !> Makes empty lists for n(1) columns and n(2) rows of cells.
+  !> Creates empty lists for n(1) columns and n(2) rows of cells.
   pure subroutine open_lists(self, n)
     class(cell_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: n(2)
@@ -111,7 +110,7 @@ contains
     self%vacant = 0
   end subroutine open_lists
 
-  !> Takes an entry from the list of free entries, extending the array if there is none.
+  !> Takes an entry from the list of free entries. If there is none, the array is enlarged.
   pure subroutine new_entry(self, code, image, e)
     class(cell_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code, image(2)

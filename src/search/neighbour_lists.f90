@@ -2,19 +2,20 @@
 !> both stay within their neighbourhoods.
 !>
 !> The neighbourhood of a disk is a square around the position at which its list was made, clipped
-!> at the faces of its cell and at the sides of the box. When the disk leaves this square, which is
-!> an event, its list expires: a new list is made from the 3 x 3 cells around the disk, with a new
-!> neighbourhood. A prediction therefore tests only a few neighbours, however many disks the cells
-!> contain (Donev, Torquato and Stillinger, Journal of Computational Physics 202, 737 (2005)).
+!> at the faces of its cell and at the sides of the box. When the centre of the disk leaves this
+!> square, which is an event, its list expires: a new list and a new neighbourhood are made from the
+!> 3 x 3 cells around the disk. A prediction therefore tests only a few neighbours, however many
+!> disks the cells contain (Donev, Torquato and Stillinger, Journal of Computational Physics 202,
+!> 737 (2005)).
 !>
-!> Lists save time without changing results. A list without space for a further neighbour is marked
-!> as incomplete; until the disk receives a new one, its predictions search the 3 x 3 cells around
-!> it.
+!> Lists save time but do not change the results. A list without space for another neighbour is
+!> marked as incomplete. Until the disk receives a new list, its predictions search the 3 x 3 cells
+!> around it.
 !>
 !> If the radii differ so much that 3 x 3 cells contain very many disks, the disks with small
 !> neighbourhoods are also sorted into a second grid of narrow cells, by the centres of their
-!> neighbourhoods. Their new lists then need only 3 x 3 narrow cells, and the few disks with large
-!> neighbourhoods in 3 x 3 wide cells.
+!> neighbourhoods. A new list of such a disk then requires only a search of 3 x 3 narrow cells, and
+!> of 3 x 3 wide cells for the few disks with large neighbourhoods.
 module neighbour_lists
   use, intrinsic :: iso_fortran_env, only: real32
   use kinds, only: int16, int32, int64, pi, real64
@@ -28,56 +29,62 @@ module neighbour_lists
   private
   public :: neighbour_lists_t
 
-  integer(int32), parameter :: unlisted = -2, incomplete = -1    !! values that replace the number of entries of a list
-  !> Number of array elements copied from every list, however short, because copying a fixed number
+  !> Values in place of the number of entries of a list.
+  integer(int32), parameter :: unlisted = -2, incomplete = -1
+  !> Number of array elements copied from every list, even if it is shorter: copying a fixed number
   !> needs no branch.
   integer(int32), parameter :: always_copied = 15
-  !> Factor of the image index in an entry of a list, larger than the index of any disk.
+  !> Factor of the image index in a list entry; larger than the index of any disk.
   integer(int32), parameter :: image_unit = 2**27
-  !> Largest number of disks for which lists are used, so that 32-bit integers can number all
+  !> Maximum number of disks for which lists are used, so that 32-bit integers can number all
   !> entries.
   integer(int32), parameter :: most_listed = image_unit/4
 
-  !> Smallest width of the cells of the second, narrow grid, divided by the radius plus margin of a
-  !> disk of mean radius. A disk fits into a narrow cell if its radius plus margin is at most half the
-  !> width of the cell. With a value above 2, this includes all disks up to the mean radius and some
-  !> larger ones.
+  !> Minimum width of the cells in the second, narrow grid, in units of the radius plus margin of a
+  !> disk of mean radius. A disk fits into a narrow cell if its radius plus margin is at most half
+  !> the width of the cell. Since the value is above 2, all disks up to the mean radius and some
+  !> larger ones fit.
   real(real64), parameter :: narrow_width = 2.2_real64
 
-  !> The region around a disk for which its list is valid. When the centre of the disk leaves it,
-  !> the list expires.
+  !> The region around a disk in which its list is valid. When the centre of the disk leaves it, the
+  !> list expires.
   type :: neighbourhood_t
-    type(line_t) :: column(0:1), row(0:1)          !! (left, right) and (lower, upper) lines that bound the region
+    !> (left, right) and (lower, upper) boundaries of the region.
+    type(line_t) :: column(0:1), row(0:1)
   end type neighbourhood_t
 
   real(real64), parameter, public :: candidates_that_pay = 30.0_real64
 
   type :: neighbour_lists_t
     logical :: used = .false.
-    !> Smallest mean number of disks in 3 x 3 cells for which lists save time in a dilute system.
+    !> Minimum mean number of disks in 3 x 3 cells for which lists save time in a dilute system.
     real(real64) :: least_candidates = candidates_that_pay
-    integer(int32) :: capacity = 16                !! capacity of the list of a small disk; larger disks have more neighbours
+    !> Capacity of the list of a small disk; larger disks have more neighbours.
+    integer(int32) :: capacity = 16
     real(real64) :: mean_radius = 0.0_real64       !! [length]
-    real(real64) :: margin = 0.0_real64            !! half the width of the neighbourhood of a disk with the mean radius [length]
+    !> Half the width of the neighbourhood of a disk with the mean radius [length].
+    real(real64) :: margin = 0.0_real64
     real(real64) :: origin(2) = 0.0_real64         !! lower left corner of the box [length]
     real(real64) :: period(2) = 0.0_real64         !! edges of the box [length]
     real(real32) :: rounding = 0.0_real32          !! upper bound of the rounding errors in `extent` [length]
-    type(neighbourhood_t), allocatable :: neighbourhood(:)   !! (disks)
-    !> (4,disks) x and y of the centre relative to `origin`, radius plus `rounding`, and half the
-    !> width of the neighbourhood before clipping [length]
+    type(neighbourhood_t), allocatable :: neighbourhood(:)   !! neighbourhood of each disk
+    !> For each disk: x and y of the centre relative to `origin`, radius plus `rounding`, and half
+    !> the width of the neighbourhood before clipping; shape (4, disks) [length].
     real(real32), allocatable :: extent(:, :)
-    !> (disks+1) position in `entry` of the list of each disk. A list begins with the number of its
-    !> entries.
+    !> Position in `entry` of the list of each disk; shape (disks+1). A list starts with the number
+    !> of its entries.
     integer(int32), allocatable :: first(:)
-    !> (0:) all lists. Each entry is the index of a disk, counted from 0, plus `image_unit` times an
-    !> image index.
+    !> All lists, from index 0. An entry is the index of a disk, counted from 0, plus `image_unit`
+    !> times an image index.
     integer(int32), allocatable :: entry(:)
-    !> (0:) for the entry of disk j in the list of disk i, the position of the reverse entry, that
-    !> of disk i in the list of disk j.
+    !> For the entry of disk j in the list of disk i, the position of the reverse entry of disk i in
+    !> the list of disk j; from index 0.
     integer(int32), allocatable :: back(:)
-    integer(int32) :: parts = 1                    !! number of narrow cells per cell along each axis; 1 without narrow cells
-    real(real32) :: narrow_extent = 0.0_real32     !! largest radius plus margin of disks in narrow cells [length]
-    type(patch_t) :: narrow_patch                  !! the narrow cells, which subdivide the cells of the whole box
+    !> Number of narrow cells per cell along each axis; 1 without narrow cells.
+    integer(int32) :: parts = 1
+    !> Maximum radius plus margin of disks in narrow cells [length].
+    real(real32) :: narrow_extent = 0.0_real32
+    type(patch_t) :: narrow_patch                  !! the narrow cells, which subdivide the cells of the box
     type(cell_contents_t) :: narrow                !! disks in narrow cells
     type(cell_contents_t) :: wide                  !! all other disks with lists, in wide cells
   contains
@@ -97,10 +104,10 @@ module neighbour_lists
 
 contains
 
-  !> Allocates the neighbour lists if they are expected to save time. With lists, a prediction after
-  !> a collision tests fewer disks, but the lists themselves must be renewed, which happens more
-  !> often at lower densities. `least_candidates` and the width of the neighbourhoods were optimised
-  !> for polydisperse disks.
+  !> Allocates the neighbour lists if they are expected to save time. With lists, the prediction
+  !> after a collision tests fewer disks, but the lists must be renewed, more often at lower
+  !> densities. `least_candidates` and the width of the neighbourhoods were optimised for
+  !> polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, patch)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -133,7 +140,8 @@ contains
     call self%cut_cells(patch, int(minval(patch%width)/(narrow_width*(self%mean_radius + self%margin)), int32))
   end subroutine prepare
 
-  !> Allocates empty lists for all disks, longer ones for larger disks, which have more neighbours.
+  !> Allocates empty lists for all disks, with more space for larger disks, which have more
+  !> neighbours.
   subroutine make_room(self, disk, lower, edges)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -150,7 +158,7 @@ contains
     end if
     if (.not. allocated(self%first)) then
       allocate (self%first(n + 1), self%neighbourhood(n))
-      allocate (self%extent(4, n), source=0.0_real32)           ! the values of disks without a list are read, too
+      allocate (self%extent(4, n), source=0.0_real32)           ! values of disks without a list are also read
     end if
     self%first(1) = 0
     do i = 1, n
@@ -165,7 +173,7 @@ contains
     self%entry(self%first(:n)) = unlisted
   end subroutine make_room
 
-  !> Divides each cell of a patch into parts x parts narrow cells without disks.
+  !> Divides each cell of a patch into parts x parts empty narrow cells.
   subroutine cut_cells(self, patch, parts)
     class(neighbour_lists_t), intent(inout) :: self
     type(patch_t), intent(in) :: patch
@@ -222,8 +230,8 @@ contains
     self%neighbourhood(i)%row = clipped(faces%row(:, cell(2)), 2)
   contains
 
-    !> The two lines that bound a neighbourhood along an axis: on either side the face of the cell
-    !> or the edge of the square, whichever is closer.
+    !> The two boundaries of a neighbourhood along an axis. On each side this is the face of the
+    !> cell or the edge of the square, whichever is closer.
     pure function clipped(line, axis) result(nearer)
       type(line_t), intent(in) :: line(0:1)
       integer(int32), intent(in) :: axis
@@ -235,7 +243,7 @@ contains
       do up = 0, 1
         place = x(axis) + (2*up - 1)*margin
         if ((2*up - 1)*(line(up)%place + line(up)%inset*radius - place) <= 0 &
-          .and. .not. (line(up)%struck .and. is_wall(line(up)%code))) cycle    ! a moving side does not limit the neighbourhood
+          .and. .not. (line(up)%struck .and. is_wall(line(up)%code))) cycle    ! moving sides are no limit
         nearer(up)%place = place
         nearer(up)%inset = 0
         nearer(up)%code = looks_again - up
@@ -243,7 +251,7 @@ contains
     end function clipped
   end subroutine lay
 
-  !> Finds the disks that disk i can touch in its new neighbourhood, and makes its list.
+  !> Makes the list of disk i: finds the disks that it can touch in its new neighbourhood.
   subroutine enter(self, i, cells, patch, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -307,7 +315,7 @@ contains
   contains
 
     !> Adds the disks in the linked list of a crowded cell to the neighbour list of disk i, except
-    !> the first one, which is also in the last slot and thus already added.
+    !> the first one, which was already added because it is also in the last slot.
     subroutine add_chain(c, image)
       integer(int32), intent(in) :: c, image
       integer(int32) :: j
@@ -322,8 +330,8 @@ contains
       end do
     end subroutine add_chain
 
-    !> Adds the candidates close enough to disk i. The test is free of branches, which would often
-    !> be mispredicted.
+    !> Adds the candidates that are close enough to disk i. The test has no branches, which would
+    !> often be mispredicted.
     subroutine test_candidates(image)
       integer(int32), intent(in) :: image          !! periodic image that contains the candidates
       integer(int32) :: j, k, found(list_capacity + 1), n_found
@@ -354,7 +362,7 @@ contains
   end subroutine search
 
   !> Enters disks i and j in each other's lists, unless disk j has no list yet. `image` is the
-  !> periodic image in which disk i can touch disk j.
+  !> periodic image of disk j that disk i can touch.
   pure subroutine add_pair(self, i, j, image)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, j, image
@@ -432,7 +440,7 @@ contains
     self%entry(at) = n - 1
   end subroutine remove
 
-  !> Removes an entry from the list of disk i, if it is there.
+  !> Removes an entry, if it exists, from the list of disk i.
   pure subroutine remove_disk(self, i, entry)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i, entry
@@ -461,7 +469,7 @@ contains
     end do
   end subroutine find_cells
 
-  !> Index of the image of disk i that disk j can touch, if disk i can touch the image `image` of
+  !> Index of the image of disk i that disk j can touch, where disk i can touch the image `image` of
   !> disk j.
   elemental function reverse(image)
     integer(int32), intent(in) :: image
@@ -499,8 +507,8 @@ contains
     end associate
   end function is_short
 
-  !> Copies the neighbour list of a disk, which must not contain neighbours across a periodic side,
-  !> to its candidates.
+  !> Copies the neighbour list of a disk to its candidates. The list must not contain neighbours
+  !> across a periodic side.
   pure subroutine copy_list(self, near)
     class(neighbour_lists_t), intent(in) :: self
     type(prediction_t), intent(inout) :: near
@@ -523,8 +531,8 @@ contains
     n = max(self%entry(self%first(i)), 0)
   end function n_entries
 
-  !> The k-th neighbour, counted from 0, in the list of disk i, and the periodic image in which disk
-  !> i can touch it.
+  !> Neighbour k, counted from 0, in the list of disk i, and the periodic image in which disk i can
+  !> touch it.
   pure subroutine neighbour(self, i, k, j, image)
     class(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i, k
@@ -537,9 +545,9 @@ contains
     end associate
   end subroutine neighbour
 
-  !> Prefetches the data needed to predict the next events of several disks, in three stages: the
-  !> records of the disks, their neighbour lists, and the disks in these lists. The collision
-  !> partner of a disk is one call behind in each stage.
+  !> Prefetches the data for predicting the next events of several disks, in three stages: the
+  !> records of the disks, their neighbour lists, and the disks in these lists. In each stage, the
+  !> collision partner of a disk is prefetched one call later than the disk.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(neighbour_lists_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)

@@ -1,4 +1,4 @@
-!> Predicted events, and the procedure `earliest_contact`, with which all search methods predict
+!> Predicted events, and the procedure `earliest_contact`, by which all search methods predict
 !> disk-disk contacts.
 module neighbour_search
   use images, only: image_t
@@ -10,22 +10,23 @@ module neighbour_search
   public :: event_t, prediction_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
 
   integer(int32), parameter :: list_capacity = 64
-  !> Guarantees given by the caller of `earliest_contact`; both are given by the sum of the two
-  !> flags. `latest_clock`: the clock of the disk is `now`, and no candidate has a later clock.
+  !> Guarantees given by the caller of `earliest_contact`; the sum of both flags gives both.
+  !> `latest_clock`: the clock of the disk is `now`, and no candidate has a later clock.
   !> `no_gravity`: no gravity acts on the disks. For each combination the compiler generates a
   !> version without unneeded operations.
   integer(int32), parameter :: latest_clock = 1, no_gravity = 2
-  real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)    !! larger than all rounding errors in `earliest_contact`
+  !> Larger than all rounding errors in `earliest_contact`.
+  real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)
 
   !> A predicted event.
   type :: event_t
-    real(real64) :: time = 0.0_real64         !! time of the event, relative to the time origin `box%epoch` [time]
-    integer(int32) :: disk = 0                !! disk that stores the event
-    integer(int32) :: partner = 0             !! partner in the event: a disk (> 0) or a boundary id or other code (<= 0)
+    real(real64) :: time = 0.0_real64     !! time of the event, relative to the time origin `box%epoch` [time]
+    integer(int32) :: disk = 0                !! disk whose record contains the event
+    integer(int32) :: partner = 0             !! disk (> 0), boundary id, or other code (<= 0)
   end type event_t
 
-  !> State of a prediction for one disk: the earliest event found so far, and the candidates for an
-  !> earlier one. The components have no initial values, because setting them would cost time in
+  !> State of the prediction for one disk: the earliest event found so far, and the candidates for
+  !> an earlier one. The components have no initial values, because setting them would cost time in
   !> each prediction.
   type :: prediction_t
     real(real64) :: time                      !! time of the earliest event [time]
@@ -33,7 +34,7 @@ module neighbour_search
     integer(int32) :: disk                    !! disk for which the prediction is made
     integer(int32) :: cell                    !! number of the cell of the disk
     integer(int32) :: n                       !! number of candidates
-    integer(int32) :: list(list_capacity)     !! (n) indices of the candidates, counted from 0
+    integer(int32) :: list(list_capacity)     !! indices of the n candidates, counted from 0
   end type prediction_t
 
 contains
@@ -46,29 +47,28 @@ contains
   !> contact time is therefore bit-identical for both disks, whenever it is predicted. Simultaneous
   !> contacts are ordered by `wins`.
   !>
-  !> Contact times before `now` are rounding errors. After a perfectly inelastic collision, for
-  !> example, the distance of two disks equals the sum of their radii only within rounding errors,
-  !> which change when one disk is shifted by a period. Such a contact occurs at `now` or not at
-  !> all. Later predictions decide in the same way: the shift of a disk is itself an event, after
-  !> which its contacts are predicted anew.
+  !> Contact times before `now` result from rounding errors. For example, after a perfectly
+  !> inelastic collision the distance of two disks equals the sum of their radii only within
+  !> rounding errors, which change when one disk is shifted by a period. Such a contact occurs
+  !> either at `now` or not at all. Later predictions lead to the same decision: the shift of a disk
+  !> is itself an event, after which its contacts are predicted anew.
   !>
-  !> The contact time s is the first root of |dx + dv s| = sigma. It is calculated as
-  !> s = c/(sqrt(disc) - b), with b = dx . dv and c = dx**2 - sigma**2, which avoids cancellation for
-  !> disks close to contact. The discriminant is calculated as
-  !> disc = sigma**2 dv**2 - (dx x dv)**2, which avoids cancellation for distant disks that graze
-  !> each other. If two approaching disks touch, or overlap owing to rounding errors, they collide at
-  !> `now`.
+  !> The contact time s is the first root of |dx + dv s| = sigma. It is calculated as s =
+  !> c/(sqrt(disc) - b), with b = dx . dv and c = dx**2 - sigma**2, which avoids cancellation for
+  !> disks close to contact. The discriminant is calculated as disc = sigma**2 dv**2 - (dx x dv)**2,
+  !> which avoids cancellation for distant disks that graze each other. If two approaching disks
+  !> touch, or overlap owing to rounding errors, they collide at `now`.
   !>
   !> A single test excludes most candidates. It combines three conditions: the root must be real, it
   !> must be earlier than the earliest contact found so far, and it must be earlier than the next
-  !> event of the candidate. (A later contact need not be predicted, because the pair is tested again
-  !> at that event.) If the root is earlier than a time t, then c < -2 b (t - late), where `late` is
-  !> the later clock of the two disks. This inequality is tested with a margin larger than all
-  !> rounding errors.
+  !> event of the candidate. (A later contact need not be predicted, because the pair is tested
+  !> again at that event.) If the root is earlier than a time t, then c < -2 b (t - late), where
+  !> `late` is the later clock of the two disks. This inequality is tested with a margin larger than
+  !> all rounding errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
-    type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices that start at 0
+    type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices from 0
     type(tag_t), intent(in) :: tag(*)
-    type(prediction_t), intent(inout) :: near   !! the disk itself may be among the candidates
+    type(prediction_t), intent(inout) :: near   !! the candidates may include the disk itself
     real(real64), value :: now                !! [time]
     real(real64), intent(in) :: gravity(2)
     integer(int32), value :: known            !! 0, `latest_clock`, `no_gravity`, or their sum
@@ -113,7 +113,7 @@ contains
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0 .and. b < 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(min(disc, b*b)) - b)
-        if (t_j < now .and. .not. fresh) then ! rounding error: the contact occurs at `now` or not at all
+        if (t_j < now .and. .not. fresh) then ! rounding error: contact at `now` or not at all
           t_j = merge(2*never, now, b + (du*du + dv*dv)*(now - late) >= 0)
         end if
         if (t_j < best) then
@@ -126,7 +126,7 @@ contains
     near%time = best; near%partner = partner
   end subroutine earliest_contact
 
-  !> Returns the state of a disk as scalars.
+  !> Copies the state of a disk to scalars.
   pure subroutine read_state(d, x, y, u, v, clock, radius)
     type(disk_t), intent(in) :: d
     real(real64), intent(out) :: x, y, u, v, clock, radius
@@ -139,7 +139,7 @@ contains
   !> Coordinate of a disk after a flight of duration s.
   elemental function moved(x, v, g, s, falling) result(there)
     real(real64), intent(in) :: x, v, g, s
-    logical, intent(in) :: falling            !! whether gravity acts; if not, g is zero
+    logical, intent(in) :: falling            !! whether gravity acts; without gravity g is zero
     real(real64) :: there
 
     if (falling) then
@@ -159,7 +159,7 @@ contains
     if (falling) after = flight_velocity(v, g, s)
   end function sped_up
 
-  !> The event stored for disk i.
+  !> The event stored in the record of disk i.
   pure function event_of(disk, i) result(event)
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i
@@ -169,7 +169,7 @@ contains
   end function event_of
 
   !> True if event a precedes the simultaneous event b. Simultaneous events are ordered by the lower
-  !> id of the two disks, then by the higher one, which is 0 for events of a single disk.
+  !> id of their two disks, then by the higher one, which is 0 for events of a single disk.
   pure function wins(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
     type(tag_t), intent(in) :: tag(*)

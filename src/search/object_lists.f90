@@ -1,8 +1,10 @@
-!> Obstacles and big disks that reach into each cell. Big disks are a few disks much larger than all others.
+!> Obstacles and big disks that reach into each cell. Big disks are a few disks much larger than all
+!> others.
 !>
-!> The width of the cells is chosen for the small disks. A big disk is listed in each cell in which a small disk could touch it
-!> while the big disk stays within a margin around its reference position. A prediction for a big disk tests the small disks in the
-!> cells along its boundary. The cost of any prediction therefore depends only on the sizes of nearby disks.
+!> The width of the cells is chosen for the small disks. A big disk is listed in each cell in which
+!> a small disk could touch it while the big disk stays within a margin around its reference
+!> position. A prediction for a big disk tests the small disks in the cells along its rim. The cost
+!> of every prediction therefore depends only on the sizes of nearby disks.
 module object_lists
   use kinds, only: int16, int32, real64
   use cell_faces, only: cell_faces_t, patch_t
@@ -16,27 +18,29 @@ module object_lists
   private
   public :: largest_small_radius, place_t, object_lists_t
 
-  integer(int32), parameter :: most_big_disks = 256    !! largest number of big disks; each is tested against all other big disks
+  !> Maximum number of big disks, each of which is tested against all others.
+  integer(int32), parameter :: most_big_disks = 256
 
   !> A cell into which an obstacle or a big disk reaches.
   type :: place_t
     integer(int32) :: cell(2) = 0                !! column and row
-    integer(int32) :: image(2) = 0               !! index of the object's periodic image that reaches into the cell
+    integer(int32) :: image(2) = 0      !! index of the object's periodic image that reaches into the cell
   end type place_t
 
   type :: big_disk_t
     integer(int32) :: disk = 0                   !! index of the disk
     real(real64) :: centre(2) = 0.0_real64       !! reference position [length]
     type(place_t), allocatable :: rim(:)         !! cells in which small disks may touch the big disk
-    integer(int32), allocatable :: obstacles(:)  !! boundary ids of the obstacles that the big disk may touch, in descending order
+    !> Boundary ids of the obstacles that the big disk may touch, in descending order.
+    integer(int32), allocatable :: obstacles(:)
   end type big_disk_t
 
-  !> In each list obstacles come first, in ascending order of their indices.
+  !> Lists in which obstacles precede big disks, in ascending order of their indices.
   type, extends(cell_lists_t) :: object_lists_t
     type(big_disk_t), allocatable :: big(:)
-    real(real64) :: margin = 0.0_real64          !! margin around the reference positions of big disks [length]
+    real(real64) :: margin = 0.0_real64      !! margin around the reference positions of big disks [length]
     type(patch_t), private :: patch              !! block of cells for which the lists of obstacles were made
-    !> Lower left and upper right corner of the rectangle that contains all cells of the box [length]
+    !> Lower left and upper right corner of the rectangle of all cells of the box [length].
     real(real64), private :: span(2, 2) = 0.0_real64
   contains
     procedure :: serves
@@ -51,8 +55,8 @@ module object_lists
 
 contains
 
-  !> Radius that determines the width of the cells: the largest of all radii, or that of the small disks if a few disks are much
-  !> bigger.
+  !> Radius that determines the width of the cells: the maximum of all radii or, if a few disks are
+  !> much bigger, of the radii of the small disks.
   pure function largest_small_radius(disk) result(radius)
     type(disk_t), intent(in) :: disk(:)
     real(real64) :: radius, next
@@ -78,7 +82,7 @@ contains
     if (yes) yes = self%patch%equals(patch) .and. all(abs(span_of(patch, faces) - self%span) <= 0)
   end function serves
 
-  !> Lower left and upper right corner of the rectangle that contains all cells of the box.
+  !> Lower left and upper right corner of the rectangle of all cells of the box.
   pure function span_of(patch, faces) result(span)
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
@@ -88,7 +92,7 @@ contains
     call faces%rectangle(patch%whole, patch%whole, other, span(:, 2))
   end function span_of
 
-  !> Lists obstacles and big disks: the disks that are too large for the width of the cells.
+  !> Lists the obstacles and the big disks, which are too large for the cells.
   subroutine renew(self, sim, patch, faces)
     class(object_lists_t), intent(out) :: self
     type(simulation_t), intent(in) :: sim
@@ -110,7 +114,7 @@ contains
     call self%renew_big(sim, patch, faces)
   end subroutine renew
 
-  !> Renews the lists of big disks, because the indices of the disks may have changed.
+  !> Renews the lists of big disks after a possible change of the indices of the disks.
   subroutine renew_big(self, sim, patch, faces)
     class(object_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -178,8 +182,8 @@ contains
     end do
   end function number_of
 
-  !> Takes the present position of the k-th big disk as its reference position, and renews its
-  !> entries in the lists.
+  !> Makes the present position of big disk k its reference position, and renews its entries in the
+  !> lists.
   subroutine follow(self, sim, k, patch, faces)
     class(object_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -196,8 +200,9 @@ contains
     end associate
   end subroutine follow
 
-  !> Boundary ids, in descending order, of the obstacles that reach into the given cells. If these are all cells into which a big
-  !> disk reaches, the result includes every obstacle that it can touch, because both reach into the cell of their point of contact.
+  !> Boundary ids, in descending order, of the obstacles that reach into the given cells. If these
+  !> are all cells into which a big disk reaches, the result includes every obstacle that the disk
+  !> can touch, because both reach into the cell of their point of contact.
   pure function obstacles_along(self, places) result(codes)
     class(object_lists_t), intent(in) :: self
     type(place_t), intent(in) :: places(:)
@@ -215,7 +220,8 @@ contains
     end do
   end function obstacles_along
 
-  !> Finds the cells in which a small disk may touch the outline of a shape that has moved by up to `margin`.
+  !> Finds the cells in which a small disk may touch the outline of a shape displaced by up to
+  !> `margin`.
   subroutine find_places(shape, margin, patch, faces, places)
     class(shape_t), intent(in) :: shape
     real(real64), intent(in) :: margin             !! [length]
@@ -242,8 +248,9 @@ contains
 
   contains
 
-    !> Adds the cells of a block in which a small disk may touch the outline of the shape. The block is halved recursively until it
-    !> is a single cell, or lies completely on one side of the outline.
+    !> Adds the cells of a block in which a small disk may touch the outline of the shape. The block
+    !> is halved recursively until it is a single cell or lies completely on one side of the
+    !> outline.
     recursive subroutine search_block(low, high)
       integer(int32), intent(in) :: low(2), high(2)  !! first and last column and row
       real(real64) :: lower(2), upper(2), beyond(2), half(2), d(2)
@@ -268,7 +275,7 @@ contains
     end subroutine search_block
   end subroutine find_places
 
-  !> Appends an obstacle or a big disk to the lists of some cells.
+  !> Appends an obstacle or a big disk to the lists of several cells.
   pure subroutine enter(self, code, places)
     class(object_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code
@@ -280,7 +287,7 @@ contains
     end do
   end subroutine enter
 
-  !> Removes a big disk from the lists of some cells.
+  !> Removes a big disk from the lists of several cells.
   pure subroutine leave(self, code, places)
     class(object_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: code

@@ -1,6 +1,6 @@
-!> For each cell of the box, a list of the obstacles that a disk centred in the cell may overlap.
-!> With these lists, the cost of testing a point for overlaps does not depend on the number of
-!> obstacles; the cost of making them is proportional to it.
+!> Lists of obstacles for all cells of the box: the list of a cell contains the obstacles that a
+!> disk centred in the cell may overlap. The cost of testing a point for overlaps then does not
+!> depend on the number of obstacles, while the cost of making the lists is proportional to it.
 module obstacle_cells
   use box_geometry, only: box_t
   use grid, only: cell_lists_t, grid_t, split_block
@@ -11,9 +11,10 @@ module obstacle_cells
   private
   public :: obstacle_cells_t
 
-  !> Each list contains obstacles in ascending order of their indices.
+  !> Lists with obstacles in ascending order of their indices.
   type, extends(cell_lists_t) :: obstacle_cells_t
-    real(real64), private :: radius = -1.0_real64   !! largest radius of disks for which the lists are valid [length]
+    !> Maximum disk radius for which the lists are valid [length].
+    real(real64), private :: radius = -1.0_real64
     type(grid_t), private :: grid
   contains
     procedure :: serve
@@ -22,8 +23,8 @@ module obstacle_cells
 
 contains
 
-  !> Makes the lists for disks up to a given radius, unless the existing lists are already valid for
-  !> them.
+  !> Makes the lists for disks up to a given radius, unless the existing lists are valid for these
+  !> disks.
   subroutine serve(self, box, radius)
     class(obstacle_cells_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -43,12 +44,12 @@ contains
     self%radius = radius
     call self%grid%divide(box%lower, box%edges(), int(max(min(box%edges()/side, 32000.0_real64), 1.0_real64), int32))
     call self%open(self%grid%n)
-    do k = box%n_obstacles(), 1, -1                 ! descending, because each list begins with the entry added last
+    do k = box%n_obstacles(), 1, -1                 ! descending: each list starts with the latest entry
       call enter(self, obstacle_code(k), box%obstacle(k)%shape, box%periodic)
     end do
   end subroutine serve
 
-  !> First entry of the list for the cell that contains a point; 0 if no obstacle is near the cell.
+  !> First entry in the list of the cell that contains a point; 0 if no obstacle is near the cell.
   pure function first_near(self, p) result(e)
     class(obstacle_cells_t), intent(in) :: self
     real(real64), intent(in) :: p(2)                !! [length]
@@ -60,8 +61,7 @@ contains
     e = self%first(c(1), c(2))
   end function first_near
 
-  !> Adds an obstacle to the lists of all cells that may contain the centre of a disk overlapping
-  !> it.
+  !> Adds an obstacle to the lists of all cells that may contain the centre of an overlapping disk.
   subroutine enter(self, code, shape, periodic)
     type(obstacle_cells_t), intent(inout) :: self
     integer(int32), intent(in) :: code
@@ -113,8 +113,8 @@ contains
       end do
     end subroutine enter_block
 
-    !> Adds the obstacle to the list of one cell, unless it is already there because of another
-    !> periodic image.
+    !> Adds the obstacle to the list of a cell, unless another periodic image has already been
+    !> added.
     subroutine enter_cell(cell)
       integer(int32), intent(in) :: cell(2)         !! column and row, counted from 1
 

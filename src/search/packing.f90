@@ -1,6 +1,6 @@
-!> A set of placed disks. Tests whether a further disk fits between them, and finds the first disk
-!> that a moving disk touches. Each species has its own grid of cells, because its radii are
-!> similar; the cost of a search then does not depend on the radii of other species.
+!> A packing: a set of disks at fixed positions. The module tests whether another disk fits between
+!> them, and finds the first disk touched by a moving disk. Each species has its own grid of cells,
+!> adapted to its radii; the cost of a search then does not depend on the radii of other species.
 module packing
   use grid, only: grid_t
   use images, only: images_t
@@ -14,30 +14,30 @@ module packing
   private
   public :: packing_t
 
-  !> The grid of cells of one species.
+  !> Grid of cells of one species.
   type, extends(grid_t) :: layer_t
-    real(real64) :: radius = 0.0_real64             !! largest radius of the disks of the species [length]
+    real(real64) :: radius = 0.0_real64             !! maximum radius of the species [length]
     integer(int32) :: count = 0                     !! number of disks of the species to be placed
     real(real64) :: upper(2) = 0.0_real64           !! upper right corner [length]
     real(real64) :: width = 0.0_real64              !! smaller edge of a cell [length]
     integer(int32), allocatable :: head(:, :)       !! first disk in each cell; 0 if the cell is empty
   end type layer_t
 
-  !> A placed disk, stored as one record: neighbours in space are usually far apart in memory, and a
-  !> record costs a single cache line.
+  !> A placed disk. Neighbours in space are usually far apart in memory, so all data of a disk are
+  !> stored in one record, which costs a single cache line.
   type :: placed_t
     real(real64) :: x(2) = 0.0_real64               !! centre [length]
     real(real64) :: radius = 0.0_real64             !! [length]
-    integer(int32) :: species = 0                   !! index of the species; 0 if the disk has not been placed yet
+    integer(int32) :: species = 0      !! index of the species; 0 if the disk has not been placed yet
     integer(int32) :: next = 0                      !! next disk in the same cell; 0 at the end of the list
   end type placed_t
 
   type :: packing_t
     type(box_t) :: box
-    type(images_t), private :: images               !! images of the box
-    type(placed_t), allocatable :: disk(:)          !! (n)
-    type(layer_t), allocatable :: layer(:)          !! (number of species)
-    !> Obstacles near each cell, listed for disks up to the largest radius passed to `open_species`.
+    type(images_t), private :: images               !! periodic images of the box
+    type(placed_t), allocatable :: disk(:)          !! placed disks
+    type(layer_t), allocatable :: layer(:)          !! cells of each species
+    !> Obstacles near each cell, listed for disks up to the maximum radius passed to `open_species`.
     type(obstacle_cells_t) :: near
   contains
     procedure :: open_all_species
@@ -60,7 +60,7 @@ module packing
 
 contains
 
-  !> Creates a packing without disks, with space for `n_disks` disks.
+  !> Creates an empty packing with space for `n_disks` disks.
   function empty_packing(box, n_disks, n_species) result(packing)
     type(box_t), intent(in) :: box
     integer, intent(in) :: n_disks, n_species
@@ -71,14 +71,14 @@ contains
     allocate (packing%disk(n_disks), packing%layer(n_species))
   end function empty_packing
 
-  !> Sets up the cells of a species. Their edge is its largest diameter, or longer if the species
-  !> has few disks.
+  !> Sets up the cells of a species. Their edge is the largest diameter of the species, or longer if
+  !> there are few disks.
   subroutine open_species(self, s, radius, count, lower, upper)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: s
-    real(real64), intent(in) :: radius              !! largest radius of the disks of the species [length]
+    real(real64), intent(in) :: radius              !! maximum radius of the species [length]
     integer, intent(in) :: count                    !! number of disks of the species to be placed
-    !> Corners of a rectangle that contains the centres of all disks of the species [length]
+    !> Corners of a rectangle that contains the centres of all disks of the species [length].
     real(real64), intent(in) :: lower(2), upper(2)
     real(real64) :: side, extent(2), few
     integer(int32) :: n(2)
@@ -102,9 +102,10 @@ contains
   !> Sets up the cells of all species for given disks.
   subroutine open_all_species(self, species, radius, lower, upper)
     class(packing_t), intent(inout) :: self
-    integer, intent(in) :: species(:)               !! (n) index of the species of each disk
-    real(real64), intent(in) :: radius(:)           !! (n) [length]
-    real(real64), intent(in) :: lower(2), upper(2)  !! corners of a rectangle that contains the centres of all disks [length]
+    integer, intent(in) :: species(:)               !! index of the species of each disk
+    real(real64), intent(in) :: radius(:)           !! radius of each disk [length]
+    !> Corners of a rectangle that contains the centres of all disks [length].
+    real(real64), intent(in) :: lower(2), upper(2)
     integer(int32) :: s
 
     do s = 1, size(self%layer, kind=int32)
@@ -114,7 +115,7 @@ contains
     end do
   end subroutine open_all_species
 
-  !> Adds disk k of species s at the point p, without a test for overlaps.
+  !> Adds disk k of species s at the point p, without testing for overlaps.
   pure subroutine add(self, k, s, p, radius)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: k, s
@@ -130,7 +131,7 @@ contains
     self%layer(s)%head(c(1), c(2)) = k
   end subroutine add
 
-  !> Removes disk k from its cell, but keeps its position and radius.
+  !> Removes disk k from its cell; its position and radius are kept.
   pure subroutine remove(self, k)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: k
@@ -153,13 +154,13 @@ contains
     end associate
   end subroutine remove
 
-  !> Moves disk k along an axis, without a test for overlaps. The distance must not exceed the
+  !> Moves disk k along an axis, without testing for overlaps. The distance must not exceed the
   !> period of a periodic axis.
   pure subroutine shift(self, k, axis, distance)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: k
     integer, intent(in) :: axis                     !! 1 for x, 2 for y
-    real(real64), intent(in) :: distance            !! negative for a motion to the left or downwards [length]
+    real(real64), intent(in) :: distance            !! negative to the left or downwards [length]
     real(real64) :: p(2)
 
     associate (me => self%disk(k), box => self%box)
@@ -180,17 +181,18 @@ contains
     call self%add(k, self%disk(k)%species, p, self%disk(k)%radius)
   end subroutine shift
 
-  !> Finds the first disk that disk k touches when it moves along an axis while all others rest. On
-  !> a periodic axis, the grid of each species must extend over the whole period.
+  !> Finds the first disk that disk k touches when it moves along an axis while all others are at
+  !> rest. On a periodic axis, the grid of each species must span the whole period.
   pure subroutine find_contact(self, k, axis, sense, distance, partner)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: k
     integer, intent(in) :: axis                     !! 1 for x, 2 for y
-    integer, intent(in) :: sense                    !! 1 for a motion to the right or upwards, -1 for the opposite direction
-    !> On entry, the distance up to which to search; on return, the distance to the contact, if
-    !> there is one. [length]
+    !> 1 for a motion to the right or upwards, -1 for the opposite direction.
+    integer, intent(in) :: sense
+    !> On entry, the distance up to which to search; on return, the distance to the contact if one
+    !> was found [length].
     real(real64), intent(inout) :: distance
-    integer(int32), intent(out) :: partner          !! disk that is touched; 0 if there is none
+    integer(int32), intent(out) :: partner          !! touched disk; 0 if there is none
     integer :: s
 
     partner = 0
@@ -199,8 +201,8 @@ contains
     end do
   end subroutine find_contact
 
-  !> Version of `find_contact` for the disks of species s. Lines of cells perpendicular to the
-  !> motion are searched one by one, until the next line is beyond the contact found so far.
+  !> Version of `find_contact` for the disks of species s. Columns or rows of cells perpendicular to
+  !> the motion are searched one by one, until the next one is beyond the contact found so far.
   pure subroutine search_ahead(packing, s, k, way, distance, partner)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
@@ -283,7 +285,7 @@ contains
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
-    !> Radius of the disks; at most the largest radius passed to `open_species` [length]
+    !> Radius of the disks, at most the maximum radius passed to `open_species` [length].
     real(real64), intent(in) :: radius
     integer(int32), intent(out) :: blocker
     real(real64) :: rho
@@ -325,7 +327,7 @@ contains
     end associate
   end subroutine load_cells
 
-  !> Prefetches, for each cell around a point, the disk added last.
+  !> Prefetches the most recently added disk of each cell around a point.
   subroutine load_disks(self, s, p)
     class(packing_t), intent(in) :: self
     integer(int32), intent(in) :: s
@@ -343,8 +345,8 @@ contains
   end subroutine load_disks
 
   !> Finds a disk of species s that excludes the centres of disks of the given radius from the whole
-  !> rectangle p +- half, or sets `blocker` to 0. The search starts in the cell that contains p,
-  !> which is the most likely to hold such a disk.
+  !> rectangle p +- half; `blocker` is 0 if there is none. The search starts in the cell of p, which
+  !> is most likely to contain such a disk.
   pure subroutine search_layer(packing, s, p, half, radius, blocker)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
@@ -360,7 +362,7 @@ contains
       middle = layer%cell(p)
       blocker = blocker_in(packing, layer%head(middle(1), middle(2)), p, half, radius)
       if (blocker > 0) return
-      if (rho <= layer%width) then                  ! a search in the neighbouring cells is usually enough
+      if (rho <= layer%width) then                  ! neighbouring cells usually suffice
         corner(:, 1) = max(middle - 1, 1)
         corner(:, 2) = min(middle + 1, layer%n)
       else
@@ -391,8 +393,8 @@ contains
     end do
   end function blocker_in
 
-  !> Lists all disks whose boundary is within the distance `reach` of a point, and possibly more
-  !> distant ones, because whole cells are listed.
+  !> Lists all disks whose rim is within the distance `reach` of a point. Since whole cells are
+  !> listed, the result may include more distant disks.
   subroutine list_neighbours(self, p, reach, list, n)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: p(2), reach         !! [length]
@@ -413,7 +415,7 @@ contains
 
   contains
 
-    !> Appends to the list all disks of species s in cells within the distance rho of a point.
+    !> Appends all disks of species s in cells within the distance rho of a point.
     subroutine append_cells(p, rho)
       real(real64), intent(in) :: p(2), rho
       integer(int32) :: corner(2, 2), i, j, k

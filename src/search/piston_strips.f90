@@ -1,7 +1,7 @@
 !> Disks that a piston may touch in the near future. A piston can eventually reach every disk in the
-!> box. Until it has moved by the width of a cell, however, it can touch only disks in a strip of
+!> box. Until it has moved by one cell width, however, it can touch only the disks in its strip of
 !> adjacent columns or rows of cells (`cell_faces: find_strips`). Contacts with a piston are
-!> therefore predicted only for the disks in its strip.
+!> therefore predicted only for these disks.
 module piston_strips
   use kinds, only: int16, int32, real64
   use cell_grid, only: cell_grid_t
@@ -36,7 +36,7 @@ contains
         do m = 1, self%cells%cell(c)%in_slots()
           call add(self%cells%cell(c)%slot(m) + 1)
         end do
-        i = self%cells%chain(c)                    ! the first disk of a linked list is also in a slot of its cell
+        i = self%cells%chain(c)                    ! the first disk of a linked list is also in a slot
         if (i > 0) i = self%cells%next(i)
         do while (i > 0)
           call add(i)
@@ -50,7 +50,7 @@ contains
     disks = disks(:n)
   contains
 
-    !> Adds disk i to the list of disks that the piston may touch.
+    !> Adds disk i to the list.
     subroutine add(i)
       integer(int32), intent(in) :: i
 
@@ -66,7 +66,7 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), allocatable, intent(out) :: disks(:)
-    real(real64) :: now                            ! a copy, because `find_strips` changes the component `due`
+    real(real64) :: now                            ! copied, because `find_strips` changes `due`
     logical :: pushed(n_sides)
     integer(int32) :: i
     integer :: k
