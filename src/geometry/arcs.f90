@@ -1,11 +1,12 @@
 !> Arcs of circles, impenetrable from both sides. Disks also collide with the ends of an arc.
 !>
-!> The centre of a disk that touches an arc lies on a circle about the centre of the arc. The radius of this circle is the sum of
-!> both radii for a disk outside of the arc, and the radius of the arc minus that of the disk for a disk inside. In both cases the
-!> centre must lie between the first and the last angle of the arc. A disk larger than the arc can touch it from inside only at its
-!> ends. The centre of a disk touching an end lies on a
-!> circle around that end, which meets the circle of either face (the outer or inner side of the arc) with a common tangent. A
-!> contact with a face that rounding errors hide near an end is therefore found as a contact with the end.
+!> When a disk touches an arc, the centre of the disk lies on a circle about the centre of the arc.
+!> The radius of this circle is the sum of both radii for a disk outside the arc, and their
+!> difference for a disk inside. In both cases the centre of the disk must lie between the first and
+!> the last angle of the arc. From inside, a disk larger than the arc can touch only the ends. The
+!> centre of a disk that touches an end lies on a circle about this end, which meets the circles of
+!> both faces (the outer and the inner side of the arc) with common tangents. If rounding errors
+!> hide a contact with a face near an end, the contact is therefore found as a contact with the end.
 module arcs
   use free_flight, only: flight, later_time_to_circle, time_to_circle
   use kinds, only: never, pi, real64
@@ -14,16 +15,18 @@ module arcs
   private
   public :: arc_t, new_arc
 
-  !> Largest number of times that a parabola crosses a circle in the same direction.
+  !> Maximum number of times that a parabola crosses a circle in the same direction.
   integer, parameter :: most_crossings = 2
 
-  !> The middle of an arc is the middle of its bounding rectangle.
+  !> An arc of a circle; its middle is the middle of its bounding rectangle.
   type, extends(shape_t) :: arc_t
-    real(real64) :: centre(2) = 0.0_real64      !! vector from the middle of the arc to the centre of its circle [length]
+    !> Vector from the middle of the arc to the centre of its circle [length].
+    real(real64) :: centre(2) = 0.0_real64
     real(real64) :: radius = 0.0_real64         !! [length]
-    !> (component,end) unit vectors from the centre of the circle to the first and to the last point of the arc, counter-clockwise
+    !> Unit vectors from the centre of the circle to the first and the last point of the arc,
+    !> counter-clockwise; shape (component, end).
     real(real64) :: end_direction(2, 2) = 0.0_real64
-    logical :: is_large = .false.               !! .true. if the arc is more than half of the circle
+    logical :: is_large = .false.               !! .true. if the arc is more than half a circle
     logical :: is_closed = .false.              !! .true. if the arc is the whole circle
   contains
     procedure :: direction
@@ -40,7 +43,7 @@ module arcs
 
 contains
 
-  !> Creates an arc, which extends counter-clockwise from one angle to a larger angle.
+  !> Creates an arc, counter-clockwise from one angle to a larger one.
   pure function new_arc(centre, radius, from_angle, to_angle) result(arc)
     real(real64), intent(in) :: centre(2)       !! [length]
     real(real64), intent(in) :: radius          !! [length]
@@ -58,7 +61,7 @@ contains
     arc%is_convex = .false.
     low = radius*minval(arc%end_direction, dim=2)
     high = radius*maxval(arc%end_direction, dim=2)
-    do k = 0, 3  ! the points of the circle that are farthest to the right, top, left and bottom
+    do k = 0, 3  ! rightmost, top, leftmost and bottom point of the circle
       point = vector_at(90.0_real64*k)
       if (.not. arc%is_in_window(point)) cycle
       low = min(low, radius*point)
@@ -69,10 +72,11 @@ contains
     arc%extent = 0.5_real64*(high - low)
     offset = magnitude(arc%centre)
     arc%circumradius = maxval([(magnitude(arc%end_point(k)), k=1, 2)])
-    if (arc%is_in_window(arc%centre)) arc%circumradius = radius + offset   ! the farthest point of the circle belongs to the arc
+    ! the farthest point of the circle belongs to the arc
+    if (arc%is_in_window(arc%centre)) arc%circumradius = radius + offset
   end function new_arc
 
-  !> Unit vector in the direction of an angle. For a multiple of 90 degrees the result is exact.
+  !> Unit vector at a given angle; exact for multiples of 90 degrees.
   pure function vector_at(angle) result(e)
     real(real64), intent(in) :: angle           !! [degrees]
     real(real64) :: e(2), rest
@@ -88,18 +92,19 @@ contains
       e = -e
     case (3)
       e = [e(2), -e(1)]
-    case default                                ! 0: no rotation
+    case default                                ! no rotation
     end select
   end function vector_at
 
-  !> Whether the direction of a vector from the centre of the circle lies between the first and the
+  !> True if the direction of a vector from the centre of the circle lies between the first and the
   !> last angle of the arc.
   pure function is_in_window(self, c) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: c(2)            !! [length]
     logical :: yes
-    ! Cross products. `after_first` is positive if the vector is less than half a turn counter-clockwise of the first end of the
-    ! arc. `before_last` is positive if the last end is less than half a turn counter-clockwise of the vector.
+    ! Cross products. `after_first` is positive if the vector is less than half a turn
+    ! counter-clockwise of the first end of the arc. `before_last` is positive if the last end is
+    ! less than half a turn counter-clockwise of the vector.
     real(real64) :: after_first, before_last
 
     associate (first => self%end_direction(:, 1), last => self%end_direction(:, 2))
@@ -122,9 +127,10 @@ contains
     point = self%centre + self%radius*self%end_direction(:, k)
   end function end_point
 
-  !> Tangential velocity of the surface at a point of contact, if it moves counter-clockwise along the arc with unit speed: the unit
-  !> tangent vector of the circle at the nearest point of the arc, without its component along the surface normal. The ends of the
-  !> arc therefore move more slowly than the rest.
+  !> Tangential velocity of the surface at a point of contact, if the surface moves
+  !> counter-clockwise along the arc with unit speed: the unit tangent vector of the circle at the
+  !> nearest point of the arc, without its component along the surface normal. The ends of the arc
+  !> therefore move more slowly than the rest.
   pure function direction(self, d, normal) result(along)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), normal(2)
@@ -141,7 +147,7 @@ contains
     along = along - dot_product(along, normal)*normal
   end function direction
 
-  !> Whether a disk touches the arc from inside.
+  !> True if a disk touches the arc from inside.
   pure function is_concave_at(self, d) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -170,11 +176,12 @@ contains
 
   contains
 
-    !> Time until the disk touches the outer or the inner face of the arc. At a contact its centre is on a circle of the radius
-    !> `rho`, between the first and the last angle of the arc, and on the same side of the arc as the face; on the other side, a
-    !> disk can cross the circle without touching the face.
+    !> Time until the disk touches the outer or the inner face of the arc. At a contact, the centre
+    !> of the disk is on a circle of radius `rho`, between the first and the last angle of the arc,
+    !> and on the same side of the arc as the face. Elsewhere a disk can cross the circle without
+    !> touching the face.
     pure function time_to_face(rho, inside) result(t)
-      real(real64), intent(in) :: rho           !! radius of the circle [length]
+      real(real64), intent(in) :: rho           !! radius of the circle of contact [length]
       logical, intent(in) :: inside             !! .true. for the inner face
       real(real64) :: t, contact(2)
       integer :: skipped
@@ -193,9 +200,10 @@ contains
       t = never
     end function time_to_face
 
-    !> Whether a disk on a straight path moves away from a point or, within rounding errors, perpendicular to the direction of the
-    !> point. A disk moving away from the centre of a circle cannot collide with it from outside; without this test, rounding errors
-    !> could cause a second collision with the same face or end of the arc.
+    !> True if a disk on a straight path moves away from a point or, within rounding errors,
+    !> perpendicular to the direction of the point. A disk moving away from the centre of a circle
+    !> cannot collide with the circle from outside; without this test, rounding errors could cause a
+    !> second collision with the same face or end of the arc.
     pure function grazes(from) result(yes)
       real(real64), intent(in) :: from(2)       !! vector from the point to the centre of the disk [length]
       logical :: yes
@@ -204,7 +212,7 @@ contains
     end function grazes
   end function contact_time
 
-  !> Shortest distance between the arc and the boundary of a disk.
+  !> Minimum distance between the arc and the rim of a disk.
   pure function gap(self, d, radius) result(length)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), radius
@@ -217,8 +225,8 @@ contains
     end if
   end function gap
 
-  !> Unit vector from the point of contact on the arc to the centre of a disk that touches the arc.
-  !> A disk in the opening of an arc can touch both ends at the same time.
+  !> Unit vector from the point of contact on the arc to the centre of the touching disk. A disk in
+  !> the opening of an arc can touch both ends simultaneously.
   pure function normal(self, d, heading) result(direction)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -244,8 +252,8 @@ contains
     end do
   end function normal
 
-  !> Whether a disk centred in a rectangle can touch the arc. The test uses the bounding rectangle
-  !> of the arc, and the ring of the centres of all disks that touch the full circle.
+  !> True if a disk centred in a rectangle can touch the arc. The test uses the bounding rectangle
+  !> of the arc, and the annulus of the centres of all disks that touch the full circle.
   pure function reaches(self, d, half, radius) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -259,9 +267,9 @@ contains
       magnitude(abs(c) + half) >= self%radius - radius - slack
   end function reaches
 
-  !> Whether the arc excludes the centres of disks from a whole rectangle. Distances from the arc differ by at most half the
-  !> diagonal between the middle and any other point of the rectangle. For a large rectangle the result may be .false. although the
-  !> arc excludes it completely.
+  !> Sufficient test for the arc to exclude the centres of disks from a whole rectangle: a disk in
+  !> its middle overlaps the arc by more than half the diagonal. For a large rectangle the result
+  !> may be .false. although the arc excludes it completely.
   pure function covers(self, d, half, radius) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -270,8 +278,9 @@ contains
     yes = self%gap(d, radius) + magnitude(half) < 0
   end function covers
 
-  !> Checks that the arc overlaps the box. Along a periodic axis it must not be wider than the box, and its middle must be in the
-  !> box; otherwise images shifted by more than one period could touch disks in the box.
+  !> Checks that the arc overlaps the box. Along a periodic axis the arc must not be wider than the
+  !> box, and its middle must be in the box; otherwise images shifted by more than one period could
+  !> touch disks in the box.
   pure function misfit(self, lower, upper, periodic) result(problem)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: lower(2), upper(2)

@@ -1,4 +1,4 @@
-!> Circular obstacles, with the disks either outside or inside.
+!> Circular obstacles with the disks outside or inside.
 module circles
   use free_flight, only: time_to_circle
   use images, only: images_t
@@ -41,9 +41,9 @@ contains
   end function new_circle
 
   !> Vector to the point x from the middle of the nearest periodic image of the circle. Circles that
-  !> enclose disks have no images. If two images are equally close, a disk at x may touch both; the
-  !> image is then chosen for which the result has the same sign as the vector `heading` along the
-  !> periodic axis.
+  !> enclose disks have no images. If two images are equally close, a disk at x may touch both. The
+  !> chosen image is then the one for which the result has the same sign along the periodic axis as
+  !> the vector `heading`.
   pure function from_nearest(self, x, images, heading) result(d)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -62,7 +62,7 @@ contains
     end do
   end function from_nearest
 
-  !> Distance between the centre of the circle and that of a disk that touches it.
+  !> Distance between the centres of the circle and of a touching disk.
   pure function distance_at_contact(self, radius) result(rho)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: radius          !! radius of the disk [length]
@@ -81,7 +81,7 @@ contains
     s = time_to_circle(d, v, g, self%distance_at_contact(radius), self%encloses, within)
   end function contact_time
 
-  !> Shortest distance between the circle and the boundary of a disk.
+  !> Minimum distance between the circle and the rim of a disk.
   pure function gap(self, d, radius) result(length)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2), radius
@@ -91,13 +91,14 @@ contains
     if (self%encloses) length = -length
   end function gap
 
-  !> Unit vector from the point of contact on the circle to the centre of a disk that touches it.
+  !> Unit vector from the point of contact on the circle to the centre of the touching disk.
   !> `heading` matters only at the centre of the circle; elsewhere the point of contact is unique.
   pure function normal(self, d, heading) result(direction)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
     real(real64), intent(in), optional :: heading(2)
-    real(real64) :: direction(2), inwards(2)        ! a variable, because gfortran passes a copy of an expression
+    ! variables, because gfortran would pass a copy of an expression
+    real(real64) :: direction(2), inwards(2)
 
     if (self%encloses) then
       inwards = -d
@@ -107,7 +108,7 @@ contains
     end if
   end function normal
 
-  !> Whether a disk whose centre is in a rectangle can touch the circle.
+  !> True if a disk centred in a rectangle can touch the circle.
   pure function reaches(self, d, half, radius) result(yes)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -120,7 +121,7 @@ contains
     end if
   end function reaches
 
-  !> Whether the circle excludes the centres of disks from a whole rectangle.
+  !> True if the circle excludes the centres of disks from a whole rectangle.
   pure function covers(self, d, half, radius) result(yes)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius

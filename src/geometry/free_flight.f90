@@ -1,25 +1,26 @@
 !> Kinematics of free flight: the position of a disk after a given time, and the time until it
-!> touches a line or a circle, both measured from the time of the given position and velocity. For
-!> disk-disk contacts see `neighbour_search`.
+!> touches a line or a circle. Times are measured from the given state of the disk. Disk-disk
+!> contacts are in `neighbour_search`.
 module free_flight
   use kinds, only: never, real64
   implicit none
   private
   public :: flight, flight_velocity, time_to_line, time_to_circle, later_time_to_circle, slowest
 
-  !> Largest speed treated as zero, because contact times would overflow [length/time]
+  !> Maximum speed that is treated as zero, because contact times would overflow [length/time].
   real(real64), parameter :: slowest = 1/never
 
-  !> Relative safety margin, larger than all rounding errors, of tests that rule out contacts. Such
-  !> a test never rules out a contact that occurs, but may fail to rule out one that does not.
+  !> Relative safety margin of tests that rule out contacts; larger than all rounding errors. Such a
+  !> test never rules out a contact that occurs, but may fail to rule out a contact that does not
+  !> occur.
   real(real64), parameter :: spare = 1.0e-6_real64
-  !> Largest number of times that a time interval is halved to find a lower bound of the distance in
-  !> each part of it.
+  !> Maximum number of times that a time interval is halved to find a lower bound of the distance in
+  !> each part.
   integer, parameter :: most_halvings = 3
 
 contains
 
-  !> One coordinate of the position after the time s on a parabolic path, x + v s + g s**2/2.
+  !> Coordinate after the time s on a parabolic path, x + v s + g s**2/2.
   elemental function flight(x, v, g, s) result(there)
     real(real64), intent(in) :: x         !! [length]
     real(real64), intent(in) :: v         !! [length/time]
@@ -30,7 +31,7 @@ contains
     there = x + (v + 0.5_real64*g*s)*s
   end function flight
 
-  !> One component of the velocity after the time s, v + g s.
+  !> Velocity component after the time s, v + g s.
   elemental function flight_velocity(v, g, s) result(then)
     real(real64), intent(in) :: v, g, s
     real(real64) :: then
@@ -38,10 +39,10 @@ contains
     then = v + g*s
   end function flight_velocity
 
-  !> Time until a point crosses a line in the forward direction; `never` if it does not. Each branch
-  !> calculates the root of the quadratic equation by the formula that avoids cancellation.
+  !> Time until a point crosses a line in the forward direction; `never` if it does not. In each
+  !> branch, the root of the quadratic equation is calculated by the formula without cancellation.
   pure function time_to_line(distance, speed, acceleration) result(s)
-    real(real64), intent(in) :: distance  !! distance to the line, negative if the line is behind the point [length]
+    real(real64), intent(in) :: distance  !! distance to the line; negative behind the point [length]
     real(real64), intent(in) :: speed         !! velocity component towards the line [length/time]
     real(real64), intent(in) :: acceleration  !! acceleration component towards the line [length/time**2]
     real(real64) :: s, root
@@ -64,16 +65,17 @@ contains
     end if
   end function time_to_line
 
-  !> Time until the centre of a disk reaches a circle of radius rho around the origin, from inside
-  !> if `inside` is .true., otherwise from outside; 0 if the centre is already on the circle, or
-  !> beyond it owing to rounding, and would cross it.
+  !> Time until the centre of a disk reaches a circle of radius rho about the origin, from inside if
+  !> `inside` is .true., otherwise from outside. The result is 0 if the centre is already on the
+  !> circle, or beyond it owing to rounding, and would cross it.
   pure function time_to_circle(d, v, g, rho, inside, within) result(s)
     real(real64), intent(in) :: d(2)      !! centre of the disk relative to the centre of the circle [length]
     real(real64), intent(in) :: v(2)      !! [length/time]
     real(real64), intent(in) :: g(2)      !! [length/time**2]
     real(real64), intent(in) :: rho       !! [length]
     logical, intent(in) :: inside
-    real(real64), intent(in), optional :: within  !! latest time of interest: for a later contact the result may be `never` [time]
+    !> Latest time of interest: for a later contact the result may be `never` [time].
+    real(real64), intent(in), optional :: within
     real(real64) :: s, b, c, speed2, disc
 
     s = never
@@ -92,7 +94,7 @@ contains
       if (.not. speed2 > 0) return
       ! Inside the circle this form is free of cancellation. If a disk moves along the circle, b and
       ! c are rounding errors, and the other form of the discriminant can vanish; the contact time,
-      ! about 0, would then be the ratio of two rounding errors.
+      ! which is about 0, would then be the ratio of two rounding errors.
       if (c < 0) disc = b*b - speed2*c
       disc = sqrt(max(disc, 0.0_real64))
       if (b > 0) then
@@ -105,18 +107,18 @@ contains
     end if
   end function time_to_circle
 
-  !> Whether an accelerated point is certain not to enter a circle around the origin during a given
-  !> time, although it may start on the circle. Its squared distance from the origin minus the
-  !> squared radius is a quartic polynomial in time, whose values in an interval are never below the
-  !> smallest of its Bernstein coefficients. As the interval is halved repeatedly, the coefficients
-  !> converge to these values.
+  !> True if an accelerated point certainly does not enter a circle about the origin during a given
+  !> time; it may start on the circle. The squared distance from the origin minus the squared radius
+  !> is a quartic polynomial in time. Its values in an interval are never below the smallest of its
+  !> Bernstein coefficients, and the coefficients converge to the values when the interval is halved
+  !> repeatedly.
   pure function misses_circle(d, v, g, rho, within) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), rho, within
     logical :: yes
     real(real64) :: c(0:4), step(4), slack
 
     yes = .false.
-    if (within > sqrt(never)) return                   ! the length of the path might exceed the largest real number
+    if (within > sqrt(never)) return                   ! the length of the path might overflow
     step(1) = 0.5_real64*within*(d(1)*v(1) + d(2)*v(2))
     step(2) = within**2*((v(1)*v(1) + v(2)*v(2)) + (d(1)*g(1) + d(2)*g(2)))/6
     step(3) = 0.25_real64*within**3*(v(1)*g(1) + v(2)*g(2))
@@ -131,9 +133,9 @@ contains
 
   contains
 
-    !> Whether the quartic polynomial with the given Bernstein coefficients is certain to be
-    !> positive in the whole interval. If `from_start` is .true., it may be 0 or negative at the
-    !> start of the interval.
+    !> True if the quartic polynomial with the given Bernstein coefficients is certainly positive in
+    !> the whole interval. If `from_start` is .true., it may be 0 or negative at the start of the
+    !> interval.
     pure recursive function is_positive(c, from_start, halvings) result(yes)
       real(real64), intent(in) :: c(0:4)
       logical, intent(in) :: from_start
@@ -167,10 +169,10 @@ contains
 
   !> Version of `time_to_circle` for parabolic paths. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a
   !> quartic polynomial that vanishes at a contact. F is monotonic between the roots of its
-  !> derivative F', and F' between the roots of F''. Bisection therefore starts with an interval
-  !> that contains exactly one root, and the first contact cannot be missed. F is calculated from
-  !> the position at the time s and not from polynomial coefficients, whose rounding errors could
-  !> exceed the squared radius of a small circle.
+  !> derivative F', and F' between the roots of F''. Each bisection therefore starts with an
+  !> interval that contains exactly one root, so that the first contact cannot be missed. F is
+  !> calculated from the position at the time s and not from polynomial coefficients, whose rounding
+  !> errors could exceed the squared radius of a small circle.
   pure function time_to_circle_falling(d, v, g, rho, inside, skipped) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside
@@ -181,13 +183,13 @@ contains
     passed = 0
     cubic = [2*dot_product(d, v), 2*(dot_product(v, v) + dot_product(d, g)), 3*dot_product(v, g), dot_product(g, g)]
     bound = root_bound(cubic, rho/sqrt(cubic(3)))
-    a = 3*cubic(3); b = cubic(2); c = cubic(1)         ! F'' equals a s**2 + 2 b s + c
+    a = 3*cubic(3); b = cubic(2); c = cubic(1)         ! F'' = a s**2 + 2 b s + c
     disc = max(b*b - a*c, 0.0_real64)
     bend = [(-b - sign(sqrt(disc), a))/a, (-b + sign(sqrt(disc), a))/a]
 
     ends = [0.0_real64, min(max(bend, 0.0_real64), bound), bound, bound]
     s = never
-    from = 0                                           ! `from` and `to`: ends of an interval in which F is monotonic
+    from = 0                                           ! ends of an interval in which F is monotonic
     do k = 1, 4
       if (k < 4) then
         if ((value(cubic, ends(k)) > 0) .eqv. (value(cubic, ends(k + 1)) > 0)) cycle
@@ -210,7 +212,7 @@ contains
 
   contains
 
-    !> F, or -F if the disk is inside the circle: it changes from positive to negative at a contact.
+    !> F or, inside the circle, -F: changes from positive to negative at a contact.
     pure function apart(s) result(f)
       real(real64), intent(in) :: s
       real(real64) :: f, x(2)
@@ -220,7 +222,7 @@ contains
       if (inside) f = -f
     end function apart
 
-    !> Latest representable time before a contact, if the centre of the disk crosses the circle
+    !> Latest floating-point number before a contact, if the centre of the disk crosses the circle
     !> exactly once between the times lo and hi. The bisection uses the distance from the origin,
     !> which is more precise than the coefficients of the polynomial.
     pure function last_apart(lo, hi) result(left)
@@ -243,8 +245,8 @@ contains
   end function time_to_circle_falling
 
   !> A power of two that exceeds all roots of a cubic polynomial (Fujiwara's bound) and the square
-  !> root of `time2`, which matters if all roots are zero. A power of two ensures that a change of
-  !> units by another power of two scales all results exactly.
+  !> root of `time2`, which matters if all roots are zero. With a power of two, a change of units by
+  !> another power of two scales all results exactly.
   pure function root_bound(cubic, time2) result(bound)
     real(real64), intent(in) :: cubic(0:3), time2
     real(real64) :: bound
@@ -257,8 +259,8 @@ contains
     bound = scale(2.0_real64, power)
   end function root_bound
 
-  !> Root of a cubic polynomial in the interval from lo to hi, in which it must change sign exactly
-  !> once, found by bisection to the last bit.
+  !> Root of a cubic polynomial between lo and hi, where it must change sign exactly once, found by
+  !> bisection to the last bit.
   pure function root_between(cubic, lo, hi) result(s)
     real(real64), intent(in) :: cubic(0:3), lo, hi
     real(real64) :: s, left, right
@@ -276,7 +278,7 @@ contains
         right = s
       end if
     end do
-    s = left  ! `left` is the largest number at which `cubic` has the same sign as at lo
+    s = left  ! largest number with the same sign of `cubic` as at lo
   end function root_between
 
   !> Value of a cubic polynomial by Horner's method.

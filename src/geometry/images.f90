@@ -17,14 +17,15 @@ module images
     real(real64) :: velocity = 0.0_real64       !! velocity of the image along x [length/time]
   end type image_t
 
-  !> All periodic images of the box, each identified by two indices: (0, 0) is the box itself, and
-  !> (0, 1) the image above it. The indices are whole numbers stored as reals, because two disks may
-  !> be any number of periods apart.
+  !> All periodic images of the box, each identified by two indices: (0, 0) is the box itself, (0,
+  !> 1) the image above it. The indices are whole numbers stored as reals, because two disks may be
+  !> any number of periods apart.
   type :: images_t
-    real(real64) :: period(2) = never           !! edges of the box; set to `never` along an axis with walls [length]
+    real(real64) :: period(2) = never           !! edges of the box; `never` along an axis with walls [length]
     real(real64) :: velocity = 0.0_real64       !! velocity of the image above the box [length/time]
-    real(real64) :: offset = 0.0_real64  !! displacement, at the time origin, of the image above the box, modulo the period [length]
-    real(real64) :: removed_periods = 0.0_real64  !! number of periods that were subtracted from `offset`
+    !> Displacement of the image above the box at the time origin, modulo the period [length].
+    real(real64) :: offset = 0.0_real64
+    real(real64) :: removed_periods = 0.0_real64  !! number of periods subtracted from `offset`
   contains
     procedure :: count => count_around
     procedure :: around
@@ -41,8 +42,8 @@ contains
 
   !> Creates the images of a box, for times measured from the time origin `epoch`. At the time t of
   !> the run, the image above the box is displaced along x by velocity*t. This displacement is
-  !> reduced modulo the period without rounding errors, so that the precision does not decrease at
-  !> late times.
+  !> reduced modulo the period without rounding errors, so that late times are as precise as early
+  !> ones.
   pure function moving_images(period, velocity, epoch) result(images)
     real(real64), intent(in) :: period(2)       !! [length]
     real(real64), intent(in) :: velocity        !! [length/time]
@@ -61,12 +62,12 @@ contains
     end associate
   end function moving_images
 
-  !> Splits a number into two parts that add up to it. Each part has at most 27 significant binary
-  !> digits, so the product of two parts is exact.
+  !> Splits a number into a sum of two parts with at most 27 significant bits each, so that products
+  !> of two parts are exact.
   pure function halves(x)
     real(real64), intent(in) :: x
     real(real64) :: halves(2)
-    integer, parameter :: half = 26             ! number of significant binary digits of `halves(1)`
+    integer, parameter :: half = 26             ! number of significant bits of `halves(1)`
 
     halves(1) = scale(aint(scale(fraction(x), half)), exponent(x) - half)
     halves(2) = x - halves(1)
@@ -80,7 +81,7 @@ contains
     n = product(2*self%reach() + 1)
   end function count_around
 
-  !> Largest index, along each axis, of the images to be searched for collision partners. Until the
+  !> Maximum index, along each axis, of the images to be searched for collision partners. Until the
   !> time `valid_until`, a disk in the box can touch only disks in these images, provided that no
   !> disk leaves the box.
   pure function reach(self)
@@ -91,12 +92,13 @@ contains
     if (abs(self%velocity) > 0) reach(1) = 2
   end function reach
 
-  !> Indices of the k-th image to be searched for collision partners; the images are numbered row by
+  !> Indices of image k in the list of images to be searched for collision partners, numbered row by
   !> row.
   pure function around(self, k, now) result(number)
     class(images_t), intent(in) :: self
     integer, intent(in) :: k                    !! number of the image, starting at 1
-    real(real64), intent(in), optional :: now   !! time relative to `box%epoch`; needed in a sheared box [time]
+    !> Time relative to `box%epoch`; required in a sheared box [time].
+    real(real64), intent(in), optional :: now
     real(real64) :: number(2)
     integer :: reach(2)
 
@@ -108,7 +110,7 @@ contains
       number(1) = number(1) - anint(self%displacement(number(2), now)/self%period(1))
   end function around
 
-  !> Displacement along x of the image that is `rows` periods above the box.
+  !> Displacement along x of the image `rows` periods above the box.
   pure function displacement(self, rows, now)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
@@ -119,12 +121,13 @@ contains
   end function displacement
 
   !> Time at which the image above the box will have moved by `distance` from its present position;
-  !> `never` if the images do not move. Until then a search can use the present result of `around`,
-  !> provided that it allows for displacements of up to `distance`.
+  !> `never` if the images do not move. Until then, the present result of `around` is sufficient for
+  !> a search that allows for displacements of up to `distance`.
   pure function valid_until(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]
-    real(real64), intent(in), optional :: distance    !! displacement of the image; if absent, half a period [length]
+    !> Displacement of the image; default: half a period [length].
+    real(real64), intent(in), optional :: distance
     real(real64) :: t, farthest
 
     farthest = 0.5_real64*self%period(1)
@@ -133,12 +136,13 @@ contains
     if (abs(self%velocity) > farthest/never) t = now + farthest/abs(self%velocity)
   end function valid_until
 
-  !> Indices of the image that contains the nearest copy of an object, where dx is the separation
-  !> from the object itself. Nearly always this is the box itself, with the indices (0, 0).
+  !> Indices of the image that contains the nearest copy of an object, given the separation dx from
+  !> the object itself. Nearly always this is the box itself, with the indices (0, 0).
   pure function nearest_image(self, dx, now) result(number)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: dx(2)           !! [length]
-    real(real64), intent(in), optional :: now   !! time relative to `box%epoch`; needed in a sheared box [time]
+    !> Time relative to `box%epoch`; required in a sheared box [time].
+    real(real64), intent(in), optional :: now
     real(real64) :: number(2)
 
     number = 0
@@ -167,12 +171,12 @@ contains
     image = image_t(self%shift(number), number(2)*self%velocity)
   end function image
 
-  !> Transforms the state of a disk into the reference frame of the image that is `rows` periods
-  !> above the box. Only the coordinates and velocity components change, not the physical state.
+  !> Transforms the state of a disk to the frame of the image `rows` periods above the box.
+  !> Coordinates and velocity components change; the physical state does not.
   pure subroutine enter_image_frame(self, rows, clock, x, v, periods)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: rows
-    real(real64), intent(in) :: clock           !! time at which the disk is at the position x [time]
+    real(real64), intent(in) :: clock           !! time to which the position x refers [time]
     real(real64), intent(inout) :: x(2)         !! [length]
     real(real64), intent(inout) :: v(2)         !! [length/time]
     real(real64), intent(inout) :: periods(2)  !! image counters of the disk, which are updated

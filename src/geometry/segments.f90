@@ -2,10 +2,10 @@
 !> of a wall.
 !>
 !> A disk touches a wall when its centre reaches the stadium around the wall. The stadium consists
-!> of two straight sides, parallel to the wall at a distance equal to the radius of the disk, and of
-!> two half circles around the ends. It is convex, so the centre of a disk can reach a straight side
-!> only from outside. If rounding errors hide a contact with a straight side near an end of the
-!> wall, the contact with the half circle is found instead.
+!> of two straight sides, parallel to the wall at a distance of one disk radius, and of two half
+!> circles about the ends. It is convex, so the centre of a disk can reach a straight side only from
+!> outside. If rounding errors hide a contact with a straight side near an end of the wall, the
+!> contact with the half circle is found instead.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use kinds, only: never, real64
@@ -15,7 +15,7 @@ module segments
   public :: segment_t, new_segment
 
   type, extends(shape_t) :: segment_t
-    real(real64) :: half(2) = 0.0_real64        !! vector from the middle of the wall to its second end [length]
+    real(real64) :: half(2) = 0.0_real64      !! vector from the middle of the wall to its second end [length]
     real(real64) :: along(2) = [1.0_real64, 0.0_real64]   !! unit vector along the wall
     real(real64) :: length = 0.0_real64         !! half the length of the wall [length]
   contains
@@ -45,8 +45,8 @@ contains
   end function new_segment
 
   !> Tangential velocity of the surface at a point of contact, if the surface moves along the wall
-  !> with unit speed: the unit vector along the wall, without its component along the normal of the
-  !> surface. At the ends of the wall the surface therefore moves more slowly than between them.
+  !> with unit speed: the unit vector along the wall, without its component along the surface
+  !> normal. At the ends of the wall the surface therefore moves more slowly than between them.
   pure function direction(self, d, normal) result(along)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -86,7 +86,7 @@ contains
       t = never
       if (away >= 0) then
         t = time_to_line(away, speed, fall)
-      else if (fall > 0 .and. speed < 0) then     ! the disk rises beyond an end of the wall and may fall back onto it
+      else if (fall > 0 .and. speed < 0) then     ! rising beyond an end of the wall; may fall back onto it
         disc = speed**2 + 2*fall*away
         if (disc >= 0) t = (sqrt(disc) - speed)/fall
       end if
@@ -105,7 +105,7 @@ contains
     offset = d - min(max(place, -self%length), self%length)*self%along
   end function from_outline
 
-  !> Shortest distance between the wall and the boundary of a disk.
+  !> Minimum distance between the wall and the rim of a disk.
   pure function gap(self, d, radius) result(length)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), radius
@@ -115,10 +115,10 @@ contains
     length = sqrt(dot_product(offset, offset)) - radius
   end function gap
 
-  !> Unit vector from the point of contact on the wall to the centre of a disk that touches it.
-  !> Between the ends it is exactly the normal of the wall, without rounding errors even for very
-  !> small disks. `heading` is used only at an end of the wall; elsewhere a disk touches the wall at
-  !> one point.
+  !> Unit vector from the point of contact on the wall to the centre of the touching disk. Between
+  !> the ends it is exactly the normal of the wall, without rounding errors even for very small
+  !> disks. `heading` matters only at an end of the wall; elsewhere a disk touches the wall at one
+  !> point.
   pure function normal(self, d, heading) result(direction)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -133,8 +133,8 @@ contains
     end if
   end function normal
 
-  !> Whether a disk centred in a rectangle can touch the wall. The test looks for a separating axis,
-  !> and replaces the disk by a square of the same width.
+  !> True if a disk centred in a rectangle can touch the wall. The test looks for a separating axis,
+  !> with the disk replaced by a square of the same width.
   pure function reaches(self, d, half, radius) result(yes)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -147,8 +147,8 @@ contains
       abs(dot_product(d, across)) <= dot_product(room, abs(across)) + spare*sqrt(dot_product(d, d))
   end function reaches
 
-  !> Whether the wall excludes the centres of disks from a whole rectangle. Since the stadium around
-  !> the wall is convex, it is enough to test the corners of the rectangle.
+  !> True if the wall excludes the centres of disks from a whole rectangle. Since the stadium around
+  !> the wall is convex, it suffices to test the corners of the rectangle.
   pure function covers(self, d, half, radius) result(yes)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius
@@ -158,7 +158,7 @@ contains
     yes = all([((self%gap(d + [i, j]*half, radius) < 0, i=-1, 1, 2), j=-1, 1, 2)])
   end function covers
 
-  !> Checks that the length of the wall is positive and that both ends are in the box.
+  !> Checks that the wall has a positive length and both ends in the box.
   pure function misfit(self, lower, upper, periodic) result(problem)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: lower(2), upper(2)
@@ -174,7 +174,7 @@ contains
 
   contains
 
-    !> Whether an end of the wall is outside the box.
+    !> True if an end of the wall is outside the box.
     pure function outside(point) result(yes)
       real(real64), intent(in) :: point(2)
       logical :: yes

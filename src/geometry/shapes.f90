@@ -8,20 +8,22 @@ module shapes
   private
   public :: shape_t, magnitude, spare, unit_vector
 
-  !> Relative safety margin, larger than all rounding errors. Where rounding errors make a test
-  !> uncertain, the margin selects the result with which no contact is missed.
+  !> Relative safety margin, larger than all rounding errors. If rounding errors make a test
+  !> uncertain, the margin selects the result for which no contact is missed.
   real(real64), parameter :: spare = 1.0e-6_real64
 
-  !> The outline of an obstacle. All points are relative to the middle of the obstacle.
+  !> Outline of an obstacle. All points are relative to the middle of the obstacle.
   type, abstract :: shape_t
     real(real64) :: middle(2) = 0.0_real64      !! [length]
-    logical :: encloses = .false.               !! .true. if the disks are inside the obstacle, .false. if they are outside
-    logical :: is_round = .false.               !! .true. if the outline is a circle and the disks are outside
-    !> Whether a disk that leaves the outline on a straight path cannot touch it again
+    logical :: encloses = .false.               !! .true. if the disks are inside the obstacle
+    logical :: is_round = .false.               !! .true. if the outline is a circle with the disks outside
+    !> Whether a disk that leaves the outline on a straight path can never touch it again.
     logical :: is_convex = .true.
-    real(real64) :: extent(2) = 0.0_real64      !! half width and half height of the bounding rectangle [length]
-    real(real64) :: circumradius = 0.0_real64   !! largest distance of a point of the outline from the middle [length]
-    real(real64) :: area = 0.0_real64  !! area that the outline encloses [length**2]
+    !> Half width and half height of the bounding rectangle [length].
+    real(real64) :: extent(2) = 0.0_real64
+    !> Maximum distance of a point of the outline from the middle [length].
+    real(real64) :: circumradius = 0.0_real64
+    real(real64) :: area = 0.0_real64  !! area enclosed by the outline [length**2]
   contains
     procedure :: from_nearest
     procedure :: direction
@@ -41,15 +43,17 @@ module shapes
     pure function contact_time(self, d, v, g, radius, within) result(s)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
-      real(real64), intent(in) :: d(2)          !! vector from the middle of the obstacle to the centre of the disk [length]
+      !> Vector from the middle of the obstacle to the centre of the disk [length].
+      real(real64), intent(in) :: d(2)
       real(real64), intent(in) :: v(2)          !! [length/time]
       real(real64), intent(in) :: g(2)          !! [length/time**2]
       real(real64), intent(in) :: radius        !! radius of the disk [length]
-      real(real64), intent(in), optional :: within  !! latest time of interest: for a later contact the result may be `never` [time]
+      !> Latest time of interest: for a later contact the result may be `never` [time].
+      real(real64), intent(in), optional :: within
       real(real64) :: s
     end function contact_time
 
-    !> Shortest distance between the outline and the rim of a disk; negative if they overlap.
+    !> Minimum distance between the outline and the rim of a disk; negative if they overlap.
     pure function gap(self, d, radius) result(length)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -57,9 +61,9 @@ module shapes
       real(real64) :: length
     end function gap
 
-    !> Unit vector from the point of contact on the outline to the centre of a disk that touches it.
-    !> Of several contact points, the one is chosen whose normal has the smallest angle to the
-    !> vector `heading`. The result is a unit vector even if the centre of the disk is on the
+    !> Unit vector from the point of contact on the outline to the centre of the touching disk. If
+    !> there are several points of contact, the normal with the smallest angle to the vector
+    !> `heading` is chosen. The result is a unit vector even if the centre of the disk is on the
     !> outline or at the centre of a circle.
     pure function normal(self, d, heading) result(direction)
       import :: real64, shape_t
@@ -69,7 +73,7 @@ module shapes
       real(real64) :: direction(2)
     end function normal
 
-    !> Whether a disk centred in the rectangle d +- half can touch the outline; .true. if rounding
+    !> True if a disk centred in the rectangle d +- half can touch the outline, or if rounding
     !> errors make this uncertain.
     pure function reaches(self, d, half, radius) result(yes)
       import :: real64, shape_t
@@ -78,9 +82,9 @@ module shapes
       logical :: yes
     end function reaches
 
-    !> Whether the obstacle excludes the centres of disks from the whole rectangle d +- half;
-    !> .false. if rounding errors make this uncertain. For a single point (half = 0) the result is
-    !> exact.
+    !> True if the obstacle certainly excludes the centres of disks from the whole rectangle d +-
+    !> half. If rounding errors make this uncertain, the result is .false.; for a single point (half
+    !> = 0) it is exact.
     pure function covers(self, d, half, radius) result(yes)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -88,7 +92,7 @@ module shapes
       logical :: yes
     end function covers
 
-    !> Reason why the obstacle does not fit into a box, as `variable: problem`; empty if it fits.
+    !> Reason why the obstacle does not fit into a box, as "variable: problem"; empty if it fits.
     pure function misfit(self, lower, upper, periodic) result(problem)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
@@ -101,7 +105,7 @@ module shapes
 contains
 
   !> Length of a vector. Multiplying the vector by a power of two multiplies the result by exactly
-  !> the same power. The `norm2` of gfortran, which scales the vector, would introduce rounding
+  !> the same power. The `norm2` of gfortran scales the vector, which would introduce rounding
   !> errors.
   pure function magnitude(v)
     real(real64), intent(in) :: v(2)
@@ -110,14 +114,15 @@ contains
     magnitude = sqrt(v(1)*v(1) + v(2)*v(2))
   end function magnitude
 
-  !> Unit vector in the direction of v or, if v vanishes, of `otherwise`. This occurs at the centre
-  !> of a container hardly larger than a disk, and where a disk in a time-stepped simulation stops
-  !> exactly on an obstacle.
+  !> Unit vector in the direction of v or, if v vanishes, of `otherwise`. A vanishing v occurs at
+  !> the centre of a container hardly larger than a disk, and when a disk in a time-stepped
+  !> simulation stops exactly on an obstacle.
   pure function unit_vector(v, otherwise) result(e)
     real(real64), intent(in) :: v(2)
-    real(real64), intent(in), optional :: otherwise(2)  !! the x direction, if absent or 0
+    real(real64), intent(in), optional :: otherwise(2)  !! default, also if it is 0: the x direction
     real(real64) :: e(2)
-    real(real64), parameter :: shortest = sqrt(tiny(1.0_real64))   ! the squares of smaller components are not precise
+    ! the squares of smaller components are imprecise
+    real(real64), parameter :: shortest = sqrt(tiny(1.0_real64))
 
     if (magnitude(v) > shortest) then
       e = v/magnitude(v)
@@ -130,9 +135,9 @@ contains
 
   !> Vector to the point x from the middle of the nearest periodic image of the obstacle. The
   !> distances of x from the outlines of all images are compared, because the nearest image of a
-  !> long wall is not always the one whose middle is nearest. If x is at equal distances from two
-  !> images, a disk at x may touch both; the function then chooses the image whose normal has the
-  !> smallest angle to the vector `heading`.
+  !> long wall is not always the one with the nearest middle. If x is equally distant from two
+  !> images, a disk at x may touch both; the image whose normal has the smallest angle to the vector
+  !> `heading` is then chosen.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
@@ -158,11 +163,12 @@ contains
     end do
   end function from_nearest
 
-  !> Unit tangent vector at the point of contact with a disk, pointing counter-clockwise around the
-  !> middle of the obstacle.
+  !> Unit tangent vector at the point of contact with a disk, counter-clockwise around the middle of
+  !> the obstacle.
   pure function direction(self, d, normal) result(along)
     class(shape_t), intent(in) :: self
-    real(real64), intent(in) :: d(2)            !! vector from the middle of the obstacle to the centre of the disk [length]
+    !> Vector from the middle of the obstacle to the centre of the disk [length].
+    real(real64), intent(in) :: d(2)
     real(real64), intent(in) :: normal(2)       !! unit vector from the outline to the disk
     real(real64) :: along(2)
 
@@ -170,10 +176,12 @@ contains
     if (self%encloses) along = -along
   end function direction
 
-  !> Whether the outline is concave where a disk touches it, so that the disk can slide along it.
+  !> True if the outline is concave at the point of contact with a disk, so that the disk can slide
+  !> along it.
   pure function is_concave_at(self, d) result(yes)
     class(shape_t), intent(in) :: self
-    real(real64), intent(in) :: d(2)            !! vector from the middle of the obstacle to the centre of the disk [length]
+    !> Vector from the middle of the obstacle to the centre of the disk [length].
+    real(real64), intent(in) :: d(2)
     logical :: yes
 
     yes = self%encloses
