@@ -1,5 +1,6 @@
 """Tests of sweeps from Python, and of tables of member runs."""
 
+import multiprocessing
 import os
 import re
 import shutil
@@ -44,7 +45,8 @@ def test_a_sweep_and_the_script_go_on_with_each_others_members(tmp_path):
     scans = ["contact.restitution=0.8,0.95", "species.a.velocity=1,-1;0,1", "run.seed=1,2"]
     told = ran(*script, *(word for scan in scans for word in ("--scan", scan)))
     assert told.returncode == 0 and "8 of 8 members finished, 4 of them before" in told.stderr
-    with ProcessPoolExecutor(2) as pool:
+    # A fork of this process would copy locks that other threads may hold.
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
         again = sweep(text, {**VALUES, "species.a.velocity": [(1, -1), (0, 1)]}, tmp_path, pool)
     assert len(again) == 8 and set(again.state) == {"finished"}
     with pytest.raises(RunError, match="another input"):
