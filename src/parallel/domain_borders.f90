@@ -1,7 +1,7 @@
 !> Compares and corrects ghosts (copies of disks owned by neighbouring domains) after each time
-!> window. A ghost is wrong if it has moved differently from its original. If a disk owned by the
-!> domain can have touched a wrong ghost, the window is invalid; otherwise wrong ghosts are
-!> corrected. The proof that this criterion is sufficient is in docs/explanation/algorithm.md.
+!> window. A ghost is wrong if it moved differently from its original. If a disk owned by the domain
+!> can have touched a wrong ghost, the window is invalid; otherwise the wrong ghosts are corrected.
+!> The page docs/explanation/algorithm.md proves that this criterion is sufficient.
 module domain_borders
   use kinds, only: int16, int32, int64
   use domains, only: correction_t, domain_t, forever, list_ghosts, slot_of_ghost
@@ -13,9 +13,9 @@ module domain_borders
 
 contains
 
-  !> Determines whether a disk owned by the k-th domain can have touched a wrong or missing ghost,
-  !> and lists the corrections for the ghosts of this domain, reading the states of the neighbouring
-  !> domains.
+  !> Determines whether a disk owned by domain k can have touched a wrong or missing ghost, and
+  !> lists the corrections for the ghosts of this domain. The states of the neighbouring domains are
+  !> read but not changed.
   subroutine compare_ghosts(domain, k)
     type(domain_t), intent(inout) :: domain(:)
     integer(int32), intent(in) :: k
@@ -28,7 +28,7 @@ contains
       do m = 1, size(self%neighbour)
         if (self%valid) call compare(self, domain(self%neighbour(m)), found)
       end do
-      if (found < self%engine%histories%n_ghosts()) self%valid = .false.  ! the owner of a ghost was not found
+      if (found < self%engine%histories%n_ghosts()) self%valid = .false.  ! a ghost without an owner
     end associate
   end subroutine compare_ghosts
 
@@ -36,7 +36,7 @@ contains
   subroutine compare(self, other, found)
     type(domain_t), intent(inout) :: self
     type(domain_t), intent(in) :: other
-    integer(int32), intent(inout) :: found         !! number of ghosts whose owners have been found
+    integer(int32), intent(inout) :: found         !! number of ghosts whose owners were found
     integer(int32) :: r, s, t, cell(2), shift(2)
     logical :: met, near, same
 
@@ -50,8 +50,9 @@ contains
         if (s > 0) then
           found = found + 1
           associate (history => mine%history(mine%history_of(s)))
+              ! ghosts outside the patch must be removed or corrected
             same = history%digest == theirs%history(r)%digest .and. same_state() &
-              .and. self%patch%holds(self%sim%tag(s)%cell)  ! a ghost that has left the patch must be removed or corrected
+              .and. self%patch%holds(self%sim%tag(s)%cell)
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
             near = came_near(theirs%history(r), met)
             if (.not. met) met = mine%could_have_met(int(history%low, int32), int(history%high, int32))
@@ -68,9 +69,9 @@ contains
     end associate
   contains
 
-    !> Whether a disk of the neighbouring domain, in any periodic image, was inside the extended
-    !> domain during the window. `met` becomes .true. if it could have touched a disk owned by this
-    !> domain.
+    !> True if a disk of the neighbouring domain, in any periodic image, was inside the extended
+    !> domain during the window. `met` is set to .true. if the disk could have touched a disk owned
+    !> by this domain.
     function came_near(history, met) result(near)
       type(history_t), intent(in) :: history
       logical, intent(out) :: met
@@ -91,8 +92,8 @@ contains
       end do
     end function came_near
 
-    !> Whether the ghost with the index s in this domain and the disk with the index t in the
-    !> neighbouring domain have the same state, including the last collision partner.
+    !> True if ghost s in this domain and disk t in the neighbouring domain have the same state,
+    !> including the last collision partner.
     pure function same_state() result(yes)
       logical :: yes
 
@@ -103,12 +104,11 @@ contains
           .and. self%sim%tag(s)%last_partner == other%sim%tag(t)%last_partner
       end associate
       if (.not. yes .or. .not. allocated(self%sim%extra)) return
-      ! All components of the optional data are compared bitwise.
+      ! Optional data are compared bit by bit.
       yes = all(transfer(self%sim%extra(s), [0_int64]) == transfer(other%sim%extra(t), [0_int64]))
     end function same_state
 
-    !> Adds the true state of the disk with the index t in the neighbouring domain to the list of
-    !> corrections.
+    !> Adds the true state of disk t in the neighbouring domain to the list of corrections.
     subroutine add_correction()
       if (.not. allocated(self%corrections)) allocate (self%corrections(256))
       if (self%n_corrections == size(self%corrections)) self%corrections = [self%corrections, self%corrections]
@@ -126,7 +126,7 @@ contains
   !> domain, and removes ghosts of disks that have left it.
   subroutine correct_ghosts(self)
     type(domain_t), intent(inout) :: self
-    integer(int32), allocatable :: waiting(:)      ! (n_waiting) indices of disks whose events have to be predicted
+    integer(int32), allocatable :: waiting(:)      ! indices of disks whose events must be predicted
     integer(int32) :: k, n_waiting, slot
 
     allocate (waiting(self%n_corrections))
@@ -180,7 +180,7 @@ contains
       waiting(n_waiting) = s
     end subroutine apply_correction
 
-    !> Removes the ghost with the index s, whose original has left the extended domain.
+    !> Removes ghost s, whose original has left the extended domain.
     subroutine leave(s)
       integer(int32), intent(in) :: s
 

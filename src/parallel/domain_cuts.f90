@@ -1,6 +1,7 @@
 !> Spatial decomposition of a simulation into domains. The columns of cells are grouped into slabs,
 !> and each slab is divided into rectangles with about equal numbers of disks. Each rectangle is a
-!> domain; with the halo of cells around it, it forms the extended domain, also called its patch.
+!> domain. Together with the halo of cells around it, it forms the extended domain, also called its
+!> patch.
 module domain_cuts
   use kinds, only: int16, int32, real64
   use cell_faces, only: patch_t
@@ -12,9 +13,10 @@ module domain_cuts
     type(patch_t) :: whole
     integer(int32) :: halo = 0
     integer(int32) :: n = 0                        !! number of domains
-    integer(int32), allocatable :: low(:, :), high(:, :)   !! (2,n) first and last column and row of each domain
-    integer(int32), allocatable, private :: slab_of(:)     !! (columns) slab of each column
-    integer(int32), allocatable, private :: domain_of(:, :)!! (rows,slabs) domain of each row in each slab
+    !> First and last column and row of each domain; shape (2, n)
+    integer(int32), allocatable :: low(:, :), high(:, :)
+    integer(int32), allocatable, private :: slab_of(:)     !! slab of each column
+    integer(int32), allocatable, private :: domain_of(:, :)!! domain of each row in each slab
   contains
     procedure :: cut
     procedure :: patch_of
@@ -23,15 +25,16 @@ module domain_cuts
 
 contains
 
-  !> Divides the box into at most `wanted` domains, each wider than two halos, for a given number of
-  !> threads.
+  !> Divides the box into at most `wanted` domains for a given number of threads. Each domain is
+  !> wider than two halos.
   subroutine cut(self, whole, periodic, cell, wanted, threads, halo)
     class(domain_cuts_t), intent(inout) :: self
     type(patch_t), intent(in) :: whole
     logical, intent(in) :: periodic(2)
-    integer(int16), intent(in) :: cell(:, :)       !! (2,disks) cell of each disk
+    integer(int16), intent(in) :: cell(:, :)       !! cell of each disk; shape (2, disks)
     integer(int32), intent(in) :: wanted, threads, halo
-    integer(int32), allocatable :: slab(:), piece(:)       ! first cell of each piece, followed by the number of cells plus 1
+    ! first cell of each piece, followed by the number of cells plus 1
+    integer(int32), allocatable :: slab(:), piece(:)
     integer(int32), allocatable :: weight(:), weights(:, :)
     integer(int32) :: n(2), i, s, k, r
 
@@ -64,9 +67,9 @@ contains
     end do
   contains
 
-    !> Chooses the number of slabs and the number of domains in each slab. The estimated work is
-    !> minimised, provided that the total number of domains is not much smaller than `wanted`, and
-    !> that no domain is too narrow.
+    !> Chooses the number of slabs and the number of domains in each slab, such that the estimated
+    !> work is minimal, the total number of domains is not much smaller than `wanted`, and no domain
+    !> is too narrow.
     pure function numbers() result(n)
       integer(int32) :: n(2), most(2), columns, rows
 
@@ -79,7 +82,7 @@ contains
       end do
     end function numbers
 
-    !> Estimated work of one thread with domains of equal size: the number of domains per thread
+    !> Estimated work of one thread for domains of equal size: the number of domains per thread
     !> times the number of cells in the largest extended domain.
     pure function work(n)
       integer(int32), intent(in) :: n(2)
@@ -90,8 +93,8 @@ contains
     end function work
   end subroutine cut
 
-  !> First cells of n pieces of about equal weight into which a line of cells is divided, followed
-  !> by the number of cells plus 1. Each piece has at least `least` cells.
+  !> Divides a line of cells into n pieces of about equal weight, each with at least `least` cells.
+  !> The result contains the first cell of each piece, followed by the number of cells plus 1.
   pure function pieces(weight, n, least) result(first)
     integer(int32), intent(in) :: weight(:), n, least
     integer(int32) :: first(n + 1), k, place
@@ -112,7 +115,7 @@ contains
     end do
   end function pieces
 
-  !> The extended domain of the k-th domain, as a block of cells.
+  !> Extended domain of domain k, as a block of cells.
   pure function patch_of(self, k, periodic) result(patch)
     class(domain_cuts_t), intent(in) :: self
     integer(int32), intent(in) :: k
@@ -131,7 +134,7 @@ contains
     call patch%find_sides(periodic)
   end function patch_of
 
-  !> Indices of the domains that own disks in the halo of the k-th domain.
+  !> Indices of the domains that own disks in the halo of domain k.
   pure function neighbours_of(self, k, patch) result(list)
     class(domain_cuts_t), intent(in) :: self
     integer(int32), intent(in) :: k

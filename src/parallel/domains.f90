@@ -1,7 +1,8 @@
-!> One domain of a simulation that is divided among threads, with its own event-driven engine. A domain owns the disks in a
-!> rectangle of cells, and has ghosts (copies) of the disks in the halo around it; rectangle and halo form the extended domain,
-!> `patch`. Disks that would enter it during a time window are missing. Errors in the motion of ghosts therefore spread inwards from
-!> its edge, until `domain_borders` corrects the ghosts after the window.
+!> One domain of a divided simulation, with its own event-driven engine. A domain owns the disks in
+!> a rectangle of cells and contains ghosts (copies) of the disks in the halo around it; rectangle
+!> and halo form the extended domain, `patch`. Disks that would enter the extended domain during a
+!> time window are missing. Errors in the motion of ghosts therefore spread inwards from its edge,
+!> until `domain_borders` corrects the ghosts after the window.
 module domains
   use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
@@ -18,50 +19,53 @@ module domains
   private
   public :: advance_domain, correction_t, domain_t, forever, list_ghosts, load, merge_logs, next_time, slot_of_ghost, write_back
 
-  real(real64), parameter :: forever = 2.0e150_real64      !! a time later than the time of any event
-  !> Wall-clock time after which a domain abandons a window that it has not completed [s]
+  real(real64), parameter :: forever = 2.0e150_real64      !! later than the time of any event
+  !> Wall-clock time after which a domain abandons an incomplete window [s].
   real(real64), parameter :: longest_window = 5.0_real64
   !> Number of iterations between two checks of signals and of the clock.
   integer(int64), parameter :: iterations_between_checks = 100000
-  !> A domain of n disks has n/spare + spare_at_least vacant slots (array elements without a disk) for disks that enter the extended
-  !> domain.
+  !> A domain of n disks has n/spare + spare_at_least vacant slots (array elements without a disk),
+  !> for disks that enter the extended domain.
   integer(int32), parameter :: spare = 32, spare_at_least = 200
 
-  !> True state of a disk, with which a domain corrects or adds its ghost. If the disk has left the extended domain, the ghost is
-  !> removed.
+  !> True state of a disk, which replaces or adds a ghost in a domain. If the disk has left the
+  !> extended domain, its ghost is removed instead.
   type, extends(whole_disk_t) :: correction_t
     integer(int32) :: global_index = 0             !! index of the disk in the whole simulation
-    !> Column and row of the disk, counted in the extended domain; the disk may be outside it.
+    !> Column and row of the disk in the extended domain; the disk may be outside it.
     integer(int32) :: cell(2) = 0
     integer(int32) :: slot = 0                     !! index of the ghost in this domain; 0 if there is none
   end type correction_t
 
   type :: domain_t
-    integer(int32) :: low(2) = 0, high(2) = 0      !! first and last column and row of the domain in the whole grid
-    integer(int32) :: halo = 0                     !! width of the halo in cells
-    integer(int32), allocatable :: neighbour(:)    !! indices of the domains that own disks in this extended domain
+    !> First and last column and row of the domain in the whole grid.
+    integer(int32) :: low(2) = 0, high(2) = 0
+    integer(int32) :: halo = 0                     !! width of the halo [cells]
+    !> Indices of the domains that own disks in this extended domain.
+    integer(int32), allocatable :: neighbour(:)
     type(patch_t) :: patch
     !> Owned disks and ghosts, with some vacant array elements (slots). The time origin is that of
     !> the whole simulation.
     type(simulation_t) :: sim
     type(event_driven_t) :: engine
-    !> (slots) Index of each disk in the whole simulation. The elements at vacant slots form a
-    !> linked list of these slots.
+    !> Index of each disk in the whole simulation. The elements of vacant slots form a linked list.
     integer(int32), allocatable :: global_index(:)
-    integer(int32) :: vacant = 0                   !! index of the first vacant slot; 0 if no slot is vacant
-    type(event_log_t), allocatable :: log          !! log of the collisions that this domain counts
+    integer(int32) :: vacant = 0                   !! index of the first vacant slot; 0 if there is none
+    type(event_log_t), allocatable :: log          !! log of the collisions counted by this domain
     integer(int64) :: iterations = 0               !! number of iterations of the engine in the present window
     logical :: done = .false.                      !! whether the engine has reached the end of the window
     logical :: valid = .false.                     !! whether no owned disk can have touched a wrong ghost
     integer(int32) :: n_corrections = 0
-    type(correction_t), allocatable :: corrections(:)  !! (at least n_corrections) corrections to be applied
-    integer(int32), allocatable, private :: key(:), slot(:)  !! (0:last_key) hash table of the ids and slots of the ghosts
+    !> Corrections to be applied; size at least n_corrections.
+    type(correction_t), allocatable :: corrections(:)
+    !> Hash table of the ids and slots of the ghosts; indices 0:last_key.
+    integer(int32), allocatable, private :: key(:), slot(:)
     integer(int32), private :: last_key = 0        !! largest index of the hash table: a power of two minus 1
   end type domain_t
 
 contains
 
-  !> Loads the disks in the extended domain, and predicts their events.
+  !> Loads the disks of the extended domain and predicts their events.
   subroutine load(self, sim, disks)
     type(domain_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -91,7 +95,7 @@ contains
     call start()
   contains
 
-    !> Allocates slots for n disks, and further vacant ones.
+    !> Allocates slots for n disks, and vacant ones.
     subroutine make_room()
       integer(int32) :: slots
 
@@ -146,7 +150,7 @@ contains
     end subroutine start
   end subroutine load
 
-  !> Builds the hash table that finds ghosts by their ids.
+  !> Builds the hash table for finding ghosts by their ids.
   subroutine list_ghosts(self)
     type(domain_t), intent(inout) :: self
     integer(int32) :: k, place, ghosts
@@ -194,11 +198,11 @@ contains
     if (self%key(place) == id) slot = self%slot(place)
   end function slot_of_ghost
 
-  !> Advances the domain with its ghosts to the end of a window. The window is abandoned once the
-  !> engine has done the given number of iterations or has run for `longest_window`.
+  !> Advances the domain and its ghosts to the end of a window. The domain abandons the window once
+  !> its engine has done the given number of iterations or has run for `longest_window`.
   subroutine advance_domain(self, t_end, iterations)
     type(domain_t), intent(inout) :: self
-    real(real64), intent(in) :: t_end              !! end of the window, relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: t_end              !! end of the window, relative to `box%epoch` [time]
     integer(int64), intent(in) :: iterations
     type(limits_t) :: limits
     type(error_t), allocatable :: error
@@ -206,7 +210,7 @@ contains
     integer(int64) :: iterations_left
 
     self%done = .false.
-    if (.not. self%valid) return                   ! without enough slots for all ghosts, the window is invalid
+    if (.not. self%valid) return                   ! invalid: too few slots for all ghosts
     began = seconds()
     limits%time = t_end
     iterations_left = iterations
@@ -226,7 +230,7 @@ contains
   !> Time of the next event in the domain.
   function next_time(self) result(t)
     type(domain_t), intent(inout) :: self
-    real(real64) :: t                              !! time relative to the time origin `box%epoch` [time]
+    real(real64) :: t                              !! relative to `box%epoch` [time]
     integer(int32) :: i
 
     call self%engine%queue%first(self%sim%disk, self%sim%tag, i)
@@ -245,8 +249,9 @@ contains
     end do
   end subroutine write_back
 
-  !> Merges the log entries of all domains, sorted by time, into the log of the whole simulation. `good` is set to .false. if
-  !> collisions in different domains are simultaneous, because their order is unknown.
+  !> Merges the log entries of all domains, sorted by time, into the log of the whole simulation. If
+  !> collisions in different domains are simultaneous, their order is unknown, and `good` is set to
+  !> .false.
   subroutine merge_logs(domain, log, good)
     type(domain_t), intent(inout) :: domain(:)
     type(event_log_t), intent(inout) :: log

@@ -1,8 +1,9 @@
-!> Parallel event-driven dynamics, on several cores, or on one core with domains that fit into its cache. The results are
-!> bit-identical to those of the serial engine. The box is divided into domains with an engine each, which advance independently
-!> through one time window and are then compared (see `partition` and `domains`). If a window is invalid, the simulation returns to
-!> its state before the present series of windows. The serial engine takes over for small or inactive systems, for a stop between
-!> simultaneous collisions, and in an inelastic collapse.
+!> Parallel event-driven dynamics, on several cores, or on one core with domains that fit into its
+!> cache. The results are bit-identical to those of the serial engine. The box is divided into
+!> domains, each with its own engine. They advance independently through one time window and are
+!> then compared (see `partition` and `domains`). If a window is invalid, the simulation returns to
+!> its state before the present series of windows. The serial engine takes over for small or
+!> inactive systems, for a stop between simultaneous collisions, and in an inelastic collapse.
 module parallel_events
   use kinds, only: int32, int64, real64
   use domains, only: merge_logs
@@ -17,38 +18,43 @@ module parallel_events
   private
   public :: parallel_events_t
 
-  integer, parameter :: most_windows = 24                      !! largest number of windows in one call of `run_domains`
-  real(real64), parameter :: shortest = 0.1_real64             !! shortest window that is tried, relative to the usual length
-  !> Smallest number of events per disk, left before the next limit, for which domains are worth while: `least_left` if they are
-  !> already in use, `least_left_to_begin` otherwise.
+  integer, parameter :: most_windows = 24      !! maximum number of windows in one call of `run_domains`
+  !> Minimum length of a window, relative to the usual length.
+  real(real64), parameter :: shortest = 0.1_real64
+  !> Minimum number of events per disk before the next limit for which domains pay off: `least_left`
+  !> if they are in use, `least_left_to_begin` otherwise.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
-  !> Shortest and longest period of the serial engine when domains cannot be used, a limit or an inelastic collapse has been
-  !> reached, or no event is left [events per disk]
+  !> Minimum and maximum period of the serial engine when domains cannot be used: a limit or an
+  !> inelastic collapse was reached, or no event is left [events per disk].
   integer(int64), parameter :: brief(2) = 5
-  !> Shortest and longest period of the serial engine after invalid windows [events per disk]
+  !> Minimum and maximum period of the serial engine after invalid windows [events per disk].
   integer(int64), parameter :: after_failures(2) = [5, 5*2**20]
-  !> Shortest and longest period of the serial engine while other programs use the cores [events per disk]
+  !> Minimum and maximum period of the serial engine while other programs use the cores [events per
+  !> disk].
   integer(int64), parameter :: while_busy(2) = [50, 1600]
 
-  !> Values of `predicted_by`: the engine that has predicted the events.
+  !> Values of `predicted_by`: the engine that predicted the events.
   integer, parameter :: no_engine = 0, serial_engine = 1, all_domains = 2
 
   type, extends(evolution_t) :: parallel_events_t
-    !> Template of the serial engine, which is copied when the serial engine is needed.
+    !> Template of the serial engine, copied when the serial engine is needed.
     type(event_driven_t) :: serial
     type(partition_t) :: parts
-    !> Smallest number of disks in a domain; twice as many in a periodic box, in which domains have
-    !> neighbours on all sides.
+    !> Minimum number of disks in a domain. In a periodic box, where domains have neighbours on all
+    !> sides, it is twice as large.
     integer(int32) :: least_disks = 1250
-    integer(int32) :: most_disks = 62000           !! largest number of disks in a domain that fits into the cache
+    !> Maximum number of disks in a domain that fits into the cache.
+    integer(int32) :: most_disks = 62000
     !> Average number of active cores below which the serial engine is faster than several threads.
     real(real64) :: least_cores = 1.25_real64
     integer(int64) :: windows_done = 0, windows_failed = 0
-    ! The serial engine exists only while there are no domains, to save memory.
+    ! To save memory, the serial engine exists only while there are no domains.
     type(event_driven_t), allocatable, private :: engine   !! the serial engine in use
-    integer, private :: predicted_by = no_engine   !! engine that holds the predicted events
-    integer(int64), private :: serial_period = 0   !! length of the last period of the serial engine [events per disk]
-    integer(int64), private :: serial_until = -1   !! total number of events at which the last period of the serial engine ends
+    integer, private :: predicted_by = no_engine   !! engine with the predicted events
+    !> Length of the last period of the serial engine [events per disk].
+    integer(int64), private :: serial_period = 0
+    !> Total number of events at the end of the last period of the serial engine.
+    integer(int64), private :: serial_until = -1
   contains
     procedure :: start
     procedure :: renew
@@ -58,7 +64,8 @@ module parallel_events
 
 contains
 
-  !> Prepares a run without predicting events, because the engine that will execute them is still unknown.
+  !> Prepares a run. No events are predicted yet, because the engine that will execute them is
+  !> unknown.
   subroutine start(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -75,8 +82,8 @@ contains
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
 
-  !> Updates the predicted events after changes of disks. The serial engine predicts the events of these disks anew; domains cannot,
-  !> and are loaded again.
+  !> Updates the predicted events after changes of disks. The serial engine predicts the events of
+  !> these disks anew; domains cannot do this and are loaded again.
   subroutine renew(self, sim, changed)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -90,7 +97,7 @@ contains
     end if
   end subroutine renew
 
-  !> Largest number of domains, and therefore of threads, for which the work on ghosts pays off.
+  !> Maximum number of domains, and therefore of threads, for which the work on ghosts pays off.
   pure function most_domains(self, n_disks, periodic) result(n)
     class(parallel_events_t), intent(in) :: self
     integer(int32), intent(in) :: n_disks
@@ -100,7 +107,8 @@ contains
     n = n_disks/(self%least_disks*merge(2, 1, all(periodic)))
   end function most_domains
 
-  !> Advances the simulation until a limit is reached, or until the caller has to check signals again.
+  !> Advances the simulation until a limit is reached, or until the caller has to check signals
+  !> again.
   subroutine advance(self, sim, limits, error, log)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -114,17 +122,17 @@ contains
     serially = .not. domains_pay(self, sim, limits)
     if (.not. serially) then
       call run_domains(self, sim, limits, log)
-      serially = sim%tally%events < self%serial_until        ! `run_domains` has selected the serial engine
+      serially = sim%tally%events < self%serial_until        ! selected by `run_domains`
     end if
     if (serially) call advance_serially(self, sim, limits, error, log)
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain) .and. &
       (sim%now >= sim%epoch_end .or. sim%tally%events >= most_events(sim))) then
-      deallocate (self%parts%domain)               ! the memory of the domains is needed to sort the disks
+      deallocate (self%parts%domain)               ! sorting the disks requires the memory of the domains
       self%predicted_by = no_engine
     end if
   end subroutine advance
 
-  !> Whether several domains can be faster than the serial engine.
+  !> True if several domains can be faster than the serial engine.
   pure function domains_pay(self, sim, limits) result(yes)
     class(parallel_events_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -137,8 +145,8 @@ contains
       .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
   end function domains_pay
 
-  !> Advances the domains by several windows. If any window is invalid, the simulation keeps the state before the call, and the
-  !> next call tries shorter windows.
+  !> Advances the domains by several windows. If a window is invalid, the simulation keeps its state
+  !> from before the call, and the next call tries shorter windows.
   subroutine run_domains(self, sim, limits, log)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -164,7 +172,7 @@ contains
       if (good) call merge_logs(self%parts%domain, log, good)
     end if
     ! Only the serial engine finds the exact event at which a limit is reached, and examines
-    ! collisions that can be part of a collapse.
+    ! collisions that may be part of a collapse.
     too_far = good
     if (good) too_far = limits%outgrown(self%parts%total_tally(sim)) .or. t - sim%last_advance < sim%negligible_time &
       .or. any(self%parts%domain%sim%tally%unexamined > 0)
@@ -187,8 +195,8 @@ contains
     if (all(self%parts%domain%engine%idle)) call use_serial_engine(self, sim, brief)
   end subroutine run_domains
 
-  !> Largest number of windows in the next call of `run_domains`. It is reduced after invalid
-  !> windows, because a single invalid window invalidates all windows of a call.
+  !> Maximum number of windows in the next call of `run_domains`. The number is reduced after
+  !> invalid windows, because one invalid window invalidates all windows of a call.
   pure function most_windows_now(self) result(n)
     class(parallel_events_t), intent(in) :: self
     integer :: n
@@ -196,9 +204,9 @@ contains
     n = max(1, int(most_windows*self%parts%shortening**4))
   end function most_windows_now
 
-  !> Lengthens the windows after a call in which all were valid. Within a call their length is constant: if it grew, the last
-  !> window could be invalid in every call, and the run would make no progress, because an invalid window invalidates all windows
-  !> of its call.
+  !> Lengthens the windows after a call in which all were valid. Within a call the length is
+  !> constant. If it grew, the last window of every call could be invalid; since this invalidates
+  !> all windows of the call, the run would make no progress.
   pure subroutine lengthen_windows(self, windows)
     class(parallel_events_t), intent(inout) :: self
     integer, intent(in) :: windows               !! number of windows in the last call
@@ -208,8 +216,8 @@ contains
     end associate
   end subroutine lengthen_windows
 
-  !> Shortens the windows after an invalid one or, if they are already as short as possible, selects the serial engine for a
-  !> period.
+  !> Shortens the windows after an invalid one. If they already have the minimum length, the serial
+  !> engine is selected for a period.
   subroutine shorten_windows(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -223,21 +231,20 @@ contains
     call use_serial_engine(self, sim, after_failures)
   end subroutine shorten_windows
 
-  !> Selects the serial engine for a period twice as long as the previous one, unless the domains have since executed more events
-  !> than the serial engine did in that period. Owing to this doubling, a run unsuitable for domains takes hardly longer than with
-  !> the serial engine alone.
+  !> Selects the serial engine for a period. The period is twice as long as the previous one, unless
+  !> the domains have meanwhile executed more events than the serial engine did then. Owing to this
+  !> doubling, a run unsuitable for domains takes hardly longer than with the serial engine alone.
   subroutine use_serial_engine(self, sim, periods)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    integer(int64), intent(in) :: periods(2)      !! shortest and longest period [events per disk]
+    integer(int64), intent(in) :: periods(2)      !! minimum and maximum period [events per disk]
 
     if (sim%tally%events - self%serial_until > self%serial_period*sim%n_disks()) self%serial_period = 0
     self%serial_period = min(max(2*self%serial_period, periods(1)), periods(2))
     self%serial_until = sim%tally%events + self%serial_period*sim%n_disks()
   end subroutine use_serial_engine
 
-  !> Advances the simulation with the serial engine, at most to the end of the period for which it
-  !> was selected.
+  !> Advances the simulation with the serial engine, at most to the end of the selected period.
   subroutine advance_serially(self, sim, limits, error, log)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -1,7 +1,7 @@
 !> A simulation divided into domains, which advance together by time windows. Each domain predicts
-!> and stores the events of the disks in its extended domain. The state of the whole simulation,
-!> `sim`, does not change until the states are copied back from the domains. After an invalid
-!> window, the domains hold wrong states and must be loaded again.
+!> and stores the events of the disks in its extended domain. The whole simulation, `sim`, keeps its
+!> old state until the states are copied back from the domains. After an invalid window, the states
+!> of the domains are wrong, and all domains must be loaded again.
 module partition
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
@@ -19,23 +19,26 @@ module partition
   private
   public :: partition_t
 
-  !> Wall-clock time after which `run_windows` returns, so that the caller can check signals [s]
+  !> Wall-clock time after which `run_windows` returns, so that the caller can check signals [s].
   real(real64), parameter :: longest_call = 1.0_real64
-  real(real64), parameter :: averaging_time = 0.1_real64       !! averaging time for the number of active cores [s]
+  real(real64), parameter :: averaging_time = 0.1_real64  !! averaging time for the number of active cores [s]
   !> Number of events before a limit below which the domains advance one event at a time.
   real(real64), parameter :: few_events = 20.0_real64
 
-  !> The next step of all threads, determined by one thread while the others wait.
+  !> The next step of all threads, chosen by one thread while the others wait.
   type :: plan_t
     logical :: continues = .true.
     integer :: windows = 0                         !! number of windows started
-    real(real64) :: until = 0.0_real64             !! wall-clock time after which no further window is started [s]
-    real(real64) :: t_begin = 0.0_real64, t_end = 0.0_real64   !! beginning and end of the window, relative to `box%epoch` [time]
-    integer(int64) :: events = 0                   !! number of events in the domains at the start of the window
-    logical :: corrects = .false.                  !! whether domains first apply the corrections of the previous window
-    real(real64) :: t = 0.0_real64                 !! time up to which domains advance, relative to `box%epoch` [time]
-    integer(int64) :: iterations = 0               !! largest number of iterations of an engine in this step
-    logical :: compares = .false.                  !! whether the window has ended, so that the domains are compared
+    !> Wall-clock time after which no further window is started [s].
+    real(real64) :: until = 0.0_real64
+    !> Start and end of the window, relative to `box%epoch` [time].
+    real(real64) :: t_begin = 0.0_real64, t_end = 0.0_real64
+    integer(int64) :: events = 0      !! number of events in the domains at the start of the window
+    !> Whether domains first apply the corrections of the previous window.
+    logical :: corrects = .false.
+    real(real64) :: t = 0.0_real64      !! time to which domains advance, relative to `box%epoch` [time]
+    integer(int64) :: iterations = 0               !! maximum number of iterations of an engine in this step
+    logical :: compares = .false.      !! whether the window ends with this step and domains are compared
     logical :: valid = .true.                      !! whether the window is valid
   end type plan_t
 
@@ -44,17 +47,20 @@ module partition
     integer(int32) :: wanted = 1                   !! number of domains
     real(real64) :: window = 0.5_real64            !! length of a window [collisions per disk]
     integer(int32) :: halo = 6                     !! width of the halo around a domain [cells]
-    !> Largest number of iterations of one engine in a step, relative to the number expected in all
+    !> Maximum number of iterations of one engine in a step, relative to the number expected in all
     !> domains together.
     real(real64) :: overload = 4.0_real64
-    type(patch_t) :: whole                         !! block of all cells of the box, which do not change during a run
+    type(patch_t) :: whole                         !! block of all cells of the box, constant during a run
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
-    real(real64) :: event_rate = 0.0_real64        !! number of events per unit of time; 0 if not known yet [1/time]
+    real(real64) :: event_rate = 0.0_real64        !! events per unit of time; 0 if not known yet [1/time]
     real(real64) :: iterations_per_event = 10.0_real64  !! number of iterations of an engine per event
-    real(real64) :: shortening = 1.0_real64        !! factor by which invalid windows have shortened later ones
-    integer(int32) :: widening = 0                 !! increase of the width of the halo after invalid windows [cells]
-    real(real64) :: cores = 0.0_real64             !! recent average of the number of active cores; 0 if not known yet
+    !> Factor by which invalid windows have shortened the later ones.
+    real(real64) :: shortening = 1.0_real64
+    !> Increase of the halo width after invalid windows [cells].
+    integer(int32) :: widening = 0
+    !> Recent average of the number of active cores; 0 if not known yet.
+    real(real64) :: cores = 0.0_real64
   contains
     procedure :: fill
     procedure :: run_windows
@@ -65,7 +71,7 @@ module partition
 
 contains
 
-  !> Divides a simulation and loads the domains. `cut` is .false. if this does not yield at least
+  !> Divides a simulation into domains and loads them. `cut` is .false. if there would be fewer than
   !> two domains.
   subroutine fill(self, sim, listing, cut)
     class(partition_t), intent(inout) :: self
@@ -107,7 +113,7 @@ contains
   end subroutine fill
 
   !> Updates the measured event rate, which determines the length of windows, and the measured
-  !> number of iterations per event. Their product determines the limit of iterations.
+  !> number of iterations per event. The limit of iterations is proportional to the product of both.
   pure subroutine update_rates(self, events, iterations, time)
     class(partition_t), intent(inout) :: self
     integer(int64), intent(in) :: events, iterations
@@ -118,8 +124,8 @@ contains
     self%iterations_per_event = max(iterations/real(events, real64), 1.0_real64)
   end subroutine update_rates
 
-  !> Counters and sums of the whole simulation, including the collisions in the domains since they
-  !> were loaded.
+  !> Counters and sums of the whole simulation, including collisions in the domains since they were
+  !> loaded.
   pure function total_tally(self, sim) result(so_far)
     class(partition_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -143,8 +149,8 @@ contains
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: limits
-    integer, intent(in) :: most                    !! largest number of windows
-    real(real64), intent(out) :: t                 !! end of the last window, relative to the time origin `box%epoch` [time]
+    integer, intent(in) :: most                    !! maximum number of windows
+    real(real64), intent(out) :: t                 !! end of the last window, relative to `box%epoch` [time]
     integer, intent(out) :: windows                !! number of windows started
     logical, intent(out) :: good
     type(plan_t) :: plan
@@ -199,7 +205,7 @@ contains
     good = plan%valid
   end subroutine run_windows
 
-  !> Sets up the next window.
+  !> Starts the next window.
   subroutine begin_window(self, sim, limits, plan)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -208,8 +214,8 @@ contains
     real(real64) :: length
 
     length = self%window*self%shortening*sim%n_disks()/(2*self%event_rate)
-    ! If there are more domains than threads, each domain is loaded into the cache once per
-    ! window; longer windows need fewer such loads.
+    ! With more domains than threads, each domain is loaded into the cache once per window; longer
+    ! windows need fewer such loads.
     if (self%wanted > self%threads) length = 2*length
     plan%windows = plan%windows + 1
     plan%t_begin = plan%t
@@ -221,10 +227,10 @@ contains
     call choose_target(self, sim, limits, plan)
   end subroutine begin_window
 
-  !> Chooses the time up to which all domains advance next: the end of the window, unless the
-  !> number of events or collisions would exceed its limit before. Near a limit the domains first
-  !> execute most of the remaining events, and finally single events. The limit of iterations
-  !> bounds the work of each engine in case the estimated event rate is wrong.
+  !> Chooses the time to which all domains advance next: the end of the window, unless the number of
+  !> events or collisions would exceed its limit earlier. Near a limit the domains first execute
+  !> most of the remaining events, and finally single events. The limit of iterations bounds the
+  !> work of each engine in case the estimated event rate is wrong.
   subroutine choose_target(self, sim, limits, plan)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -250,17 +256,17 @@ contains
     plan%t = min(next, plan%t_end)
   end subroutine choose_target
 
-  !> Determines after the comparison whether the window is valid, and whether another one is
-  !> started.
+  !> Determines, after the comparison of the domains, whether the window is valid and whether
+  !> another one is started.
   subroutine end_window(self, sim, limits, most, plan)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: limits
-    integer, intent(in) :: most                    !! largest number of windows
+    integer, intent(in) :: most                    !! maximum number of windows
     type(plan_t), intent(inout) :: plan
 
-    ! A negative value of `events_left` means that simultaneous events have exceeded the limit of
-    ! events or collisions.
+    ! `events_left` is negative if simultaneous events have exceeded the limit of events or
+    ! collisions.
     plan%valid = all(self%domain%done) .and. all(self%domain%valid) .and. events_left(self, sim, limits) >= 0
     if (plan%valid) then
       call self%update_rates(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%iterations), plan%t - plan%t_begin)
@@ -290,7 +296,7 @@ contains
   subroutine write_back_all(self, sim, now)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: now                !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: now                !! relative to `box%epoch` [time]
     integer(int32) :: k
     logical :: shared
 
