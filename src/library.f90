@@ -1,5 +1,5 @@
-!> The C interface, documented in the header `ricochet.h`. A handle represents an open simulation. The functions print nothing,
-!> never end the process, and share no data between handles.
+!> The C interface, documented in `ricochet.h`. A handle represents an open simulation. The
+!> functions print nothing, never end the process, and share no data between handles.
 module library
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, &
@@ -31,17 +31,18 @@ module library
   private
   public :: advance_to, answer, begin, check_files, goal_of, renew_changed, session_of, session_t, text_of
 
-  integer(c_int), parameter :: going_on = 1          !! result of `advance` if the simulation has not yet reached a limit
-  integer, parameter :: least_logged = 1000000  !! number of the most recent events kept when a full event log is shortened
+  integer(c_int), parameter :: going_on = 1          !! returned if no limit has been reached yet
+  !> Number of events kept when a full log is shortened.
+  integer, parameter :: least_logged = 1000000
 
   type :: session_t
     type(run_input_t) :: input
     type(simulation_t) :: sim
     class(evolution_t), allocatable :: evolution
     type(stop_rule_t) :: rule
-    integer(int64) :: iterations = 1                  !! number of iterations of the loop between two readings of the clock
+    integer(int64) :: iterations = 1     !! number of iterations of the loop between two readings of the clock
     logical :: logged = .false.                       !! .true. if events are logged
-    type(event_log_t) :: log                          !! the latest events; when the log is too long, the oldest ones are deleted
+    type(event_log_t) :: log      !! latest events; if the log is too long, the oldest are deleted
   end type session_t
 
 contains
@@ -66,10 +67,11 @@ contains
     code = answer(error, message, room)
   end function open_simulation
 
-  !> Starts the engine of a new simulation and returns its handle. If an error occurs, the simulation is deallocated.
+  !> Starts the engine of a new simulation and returns its handle. After an error, the simulation is
+  !> deallocated.
   function begin(session, threads, error) result(handle)
     type(session_t), pointer, intent(inout) :: session
-    !> Number of threads; 0 for the number in the input, or for one if the input contains none
+    !> Number of threads; 0 for the number in the input, or one without it.
     integer(c_int), intent(in) :: threads
     type(error_t), allocatable, intent(in) :: error
     type(c_ptr) :: handle
@@ -121,7 +123,8 @@ contains
     if (allocated(error) .or. code /= going_on) code = answer(error, message, room)
   end function advance
 
-  !> Converts the arguments of `advance` to a stop rule. Without any limit, the result is the stop rule of the input.
+  !> Converts the arguments of `advance` to a stop rule. Without any limit, the stop rule of the
+  !> input applies.
   pure function goal_of(session, time, collisions, events) result(rule)
     type(session_t), intent(in) :: session
     real(real64), intent(in) :: time                  !! time since the start of the run [time]
@@ -134,7 +137,8 @@ contains
     if (time >= never) rule%limits%time = never
   end function goal_of
 
-  !> Advances a simulation until a stop rule is met, or until `patience` seconds have passed; `code` is then `going_on`.
+  !> Advances a simulation until a stop rule is met, or until `patience` seconds have passed; `code`
+  !> is then `going_on`.
   subroutine advance_to(session, rule, patience, code, error)
     type(session_t), intent(inout) :: session
     type(stop_rule_t), intent(in) :: rule
@@ -142,7 +146,7 @@ contains
     integer(c_int), intent(out) :: code
     type(error_t), allocatable, intent(out) :: error
     type(limits_t) :: limits
-    real(real64) :: began, looked                     ! wall-clock times: start of the call, start of the present step [s]
+    real(real64) :: began, looked                     ! start of the call and of the present step [s]
 
     code = going_on
     if (ieee_is_nan(rule%limits%time)) then
@@ -168,7 +172,8 @@ contains
     code = 0
   end subroutine advance_to
 
-  !> See ricochet.h. The changed input replaces the stored one, on which later changes and saved files are based.
+  !> See ricochet.h. The changed input replaces the stored input, on which later changes and saved
+  !> files are based.
   function change(handle, overrides, message, room) bind(C, name="ricochet_change") result(code)
     type(c_ptr), value :: handle
     character(kind=c_char), intent(in) :: overrides(*)
@@ -220,7 +225,7 @@ contains
     code = answer(error, message, room)
   end function change
 
-  !> See ricochet.h. The change is added to the text of the input, as a group `&change`.
+  !> See ricochet.h. The change is added to the text of the input as a group `&change`.
   function schedule(handle, time, overrides, message, room) bind(C, name="ricochet_schedule") result(code)
     type(c_ptr), value :: handle
     real(c_double), value :: time
@@ -261,8 +266,8 @@ contains
     code = answer(error, message, room)
   end function schedule
 
-  !> The input that describes the system at the present time: in contrast to `session%input`, it includes the scheduled changes
-  !> already made.
+  !> Input for the present system. In contrast to `session%input`, it includes the scheduled changes
+  !> that have been made.
   subroutine input_in_force(session, input, error)
     type(session_t), intent(in) :: session
     type(run_input_t), intent(out) :: input
@@ -282,12 +287,12 @@ contains
     if (allocated(input%settings%schedule)) sim%schedule = input%settings%schedule
   end subroutine take_schedule
 
-  !> Reports an obstacle or initial-configuration file that has changed since the simulation was created. The input is read again
-  !> for each change and each save: with a changed file, obstacles would jump in the running simulation, and the saved file would
-  !> describe other disks.
+  !> Reports an obstacle file or initial-configuration file that has changed since the simulation
+  !> was created. Each change and each save reads the input again. With a changed file, obstacles
+  !> would jump in the running simulation, and the saved file would describe different disks.
   subroutine check_files(groups, again, error)
     type(group_t), intent(in) :: groups(:)            !! groups of the input of the simulation
-    type(group_t), intent(in) :: again(:)             !! groups of the same input, which has just been read
+    type(group_t), intent(in) :: again(:)             !! groups of the same input, just read again
     type(error_t), allocatable, intent(out) :: error
     integer :: g, k, old
 
@@ -323,7 +328,7 @@ contains
     session => session_of(handle)
     changed = session%sim
     v = reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())])
-    do i = 1, changed%n_disks()                       ! the velocities of waiting disks have no effect
+    do i = 1, changed%n_disks()                       ! velocities of waiting disks have no effect
       if (.not. changed%is_inside(i)) v(:, changed%tag(i)%id) = changed%velocity(i)
     end do
     if (.not. all(ieee_is_finite(v))) then
@@ -339,7 +344,7 @@ contains
     code = answer(error, message, room)
   end function give_velocities
 
-  !> Text that lists all changes of the simulation so far.
+  !> Text with all changes of the simulation so far.
   function changes_of(session) result(list)
     type(session_t), intent(in) :: session
     character(len=:), allocatable :: list
@@ -363,11 +368,12 @@ contains
     call problems%report(path, error)
   end subroutine check_motion
 
-  !> Replaces the state of the simulation by a changed state, and adds the change to the list of changes.
+  !> Replaces the state of the simulation by a changed state, and adds the change to the list of
+  !> changes.
   subroutine renew_changed(session, sim, what, error)
     type(session_t), intent(inout) :: session
     type(simulation_t), intent(inout) :: sim
-    character(len=*), intent(in) :: what              !! name of the quantity that was changed
+    character(len=*), intent(in) :: what              !! name of the changed quantity
     type(error_t), allocatable, intent(out) :: error
     type(run_input_t) :: input
 
@@ -442,7 +448,7 @@ contains
       if (size(list) == 0) return
       width = list(1)%width
       sample = frame_sample(sim, 0_int64, list)
-      ! The first integer of a sample is the step, and the first real is the time.
+      ! The first integer of a sample is the step, the first real is the time.
       if (list(1)%is_count) then
         values(:width*n) = real(sample%integers(2:, 1), real64)
       else
@@ -501,10 +507,11 @@ contains
     if (room > length) call give(words, text, room)
   end function copy_text
 
-  !> Text that describes the simulation, as in ricochet.h.
+  !> Text that describes the simulation; see ricochet.h.
   function described(session, groups, what) result(text)
     type(session_t), intent(in) :: session
-    type(group_t), intent(in) :: groups(:)            !! groups of the input that describes the system at the present time
+    !> Groups of the input for the present system.
+    type(group_t), intent(in) :: groups(:)
     character(len=*), intent(in) :: what
     character(len=:), allocatable :: text
     type(growing_text_t) :: growing
@@ -518,7 +525,8 @@ contains
         do k = 1, size(groups(g)%values)
           if (.not. groups(g)%values(k)%is_set()) cycle
           most = most_written
-          ! Obstacles are written with all their values, because obstacles read from a file have no other description.
+          ! Obstacles are written with all values, because obstacles read from a file are not
+          ! described otherwise.
           if (any(obstacle_groups == groups(g)%name)) most = huge(most)
           call growing%add(groups(g)%value_line(k, most)//eol)
         end do
@@ -532,7 +540,7 @@ contains
     text = growing%text()
   end function described
 
-  !> Returns the simulation that belongs to a handle.
+  !> The simulation of a handle.
   function session_of(handle) result(session)
     type(c_ptr), intent(in) :: handle
     type(session_t), pointer :: session
@@ -540,7 +548,7 @@ contains
     call c_f_pointer(handle, session)
   end function session_of
 
-  !> Copies the message of an error into a C buffer and returns its exit code, or 0 if there is no error.
+  !> Copies an error message to a C buffer and returns the exit code; 0 without an error.
   function answer(error, message, room) result(code)
     type(error_t), allocatable, intent(in) :: error
     character(kind=c_char), intent(inout) :: message(*)
@@ -554,11 +562,11 @@ contains
     call give(error%message, message, room)
   end function answer
 
-  !> Copies a string into a C buffer, truncating it if the buffer is too short.
+  !> Copies a string to a C buffer; a string that does not fit is truncated.
   subroutine give(text, buffer, room)
     character(len=*), intent(in) :: text
     character(kind=c_char), intent(inout) :: buffer(*)
-    integer(c_int), intent(in) :: room                !! size of the buffer, including the terminating zero [bytes]
+    integer(c_int), intent(in) :: room      !! size of the buffer, including the terminating zero [bytes]
     integer :: k
 
     if (room < 1) return

@@ -1,4 +1,5 @@
-!> Functions of the C interface `ricochet.h` for single events, copies of simulations, and positions of disks.
+!> The part of the C interface `ricochet.h` for single events, copies of simulations, and positions
+!> of disks.
 module library_events
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_ptr
   use changes, only: change_positions
@@ -14,7 +15,8 @@ module library_events
   implicit none
   private
 
-  !> Number of events and kicks after which `next_events` abandons its search; 100 n more for n requested events.
+  !> Number of events and kicks after which `next_events` gives up; increased by 100 for each
+  !> requested event.
   integer(int64), parameter :: longest_look = 2000000
 
 contains
@@ -38,7 +40,7 @@ contains
     code = answer(error, message, room)
   end function copy
 
-  !> See ricochet.h. Before the advance, the event log is emptied, unless the input requests an event log.
+  !> See ricochet.h. Unless the input requests an event log, the log is emptied first.
   function advance_event(handle, time, collisions, events, patience, message, room) bind(C, name="ricochet_advance_event") &
     result(code)
     type(c_ptr), value :: handle
@@ -74,8 +76,8 @@ contains
     if (n > 0) records(:, :n) = session%log%record(:, session%log%n - n + 1:session%log%n)
   end function last_events
 
-  !> See ricochet.h. A copy of the simulation is advanced: predictions from the present velocities would be wrong if other
-  !> collisions or kicks changed them first.
+  !> See ricochet.h. The prediction advances a copy of the simulation, because other collisions or
+  !> kicks may change the present velocities first.
   function next_events(handle, most, records) bind(C, name="ricochet_next_events") result(n)
     type(c_ptr), value :: handle
     integer(c_int), value :: most
@@ -117,13 +119,13 @@ contains
     type(session_t), pointer :: session
     type(simulation_t) :: changed
     type(error_t), allocatable :: error
-    real(real64), allocatable :: x(:, :)              ! (2,n) [length]
+    real(real64), allocatable :: x(:, :)              ! shape (2, n) [length]
     integer(int32) :: i
 
     session => session_of(handle)
     changed = session%sim
     x = reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())])
-    do i = 1, changed%n_disks()                       ! the positions of waiting disks have no effect
+    do i = 1, changed%n_disks()                       ! positions of waiting disks have no effect
       if (.not. changed%is_inside(i)) x(:, changed%tag(i)%id) = changed%disk(i)%x
     end do
     if (changed%box%is_sheared()) then

@@ -1,5 +1,5 @@
-!> Functions that save simulations to files, and load them from the output files of runs (see
-!> `ricochet.h`).
+!> The part of the C interface `ricochet.h` that saves simulations to files and loads them from the
+!> output of runs.
 module library_files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_ptr
   use sampling_schedule, only: progress_t
@@ -21,7 +21,8 @@ module library_files
 
 contains
 
-  !> See ricochet.h. The file contains the first samples of a run with the present input, and a checkpoint of the present state.
+  !> See ricochet.h. The file contains the first samples of a run with the present input, and a
+  !> checkpoint of the present state.
   function save(handle, path, force, message, room) bind(C, name="ricochet_save") result(code)
     type(c_ptr), value :: handle
     character(kind=c_char), intent(in) :: path(*)
@@ -40,7 +41,7 @@ contains
     if (.not. allocated(error)) call input_from_text(session%input%text, session%input%path, session%input%overrides, input, &
       error, stepped=.true.)
     if (.not. allocated(error)) call check_files(session%input%groups, input%groups, error)
-    if (allocated(session%input%changes)) then        ! the initial state is unknown, because the changed input does not describe it
+    if (allocated(session%input%changes)) then        ! the changed input does not describe the initial state
       first = session%sim
       input%changes = session%input%changes
     else if (.not. allocated(error)) then

@@ -12,8 +12,8 @@ program main
 
 contains
 
-  !> Serves an option that only prints information, such as --help, or performs a run. The main
-  !> program has no variables of its own, because they would not be deallocated at its end.
+  !> Answers an option such as --help, or performs a run. The main program has no variables of its
+  !> own, because they would not be deallocated at its end.
   subroutine serve()
     type(command_t) :: command
     type(run_input_t) :: input

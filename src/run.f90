@@ -30,7 +30,7 @@ module run
   public :: perform_run
 
   integer, parameter :: most_unwritten = 4096              !! capacity of the event log [events]
-  !> Size of an output above which the program prints the expected size when the run starts [bytes]
+  !> Size of the output above which the expected size is printed at the start of the run [bytes].
   integer(int64), parameter :: much = 250000000
 
   type :: run_t
@@ -42,16 +42,17 @@ module run
     type(stop_rule_t) :: stop_rule
     type(output_t) :: output
     type(progress_line_t) :: line
-    real(real64) :: started = 0.0_real64                   !! time when the program started, by the clock `seconds` [s]
-    real(real64) :: rate = 0.0_real64                      !! collisions per processor time in this part of the run [1/s]
-    real(real64) :: event_rate = 0.0_real64                !! events per processor time in this part of the run [1/s]
+    real(real64) :: started = 0.0_real64                   !! clock time when the program started [s]
+    real(real64) :: rate = 0.0_real64      !! collisions per processor time in this part of the run [1/s]
+    real(real64) :: event_rate = 0.0_real64      !! events per processor time in this part of the run [1/s]
     !> Number of events executed by the serial engine in this part of a parallel run.
     integer(int64) :: serial_events = 0
   end type run_t
 
 contains
 
-  !> Reads the input and performs the run. If a signal or the wall-clock limit stopped the run, `error` contains the exit status.
+  !> Reads the input and performs the run. If the run was stopped by a signal or the wall-clock
+  !> limit, `error` contains the exit status.
   subroutine perform_run(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -94,13 +95,13 @@ contains
     call run%output%release()
   end subroutine perform_run
 
-  !> Creates the state of a new run and opens the output. With --check, only reports that the input
-  !> is valid.
+  !> Creates the initial state of a new run and opens the output. With --check, only reports that
+  !> the input is valid.
   subroutine begin(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
     logical :: folder_is_new, over_broken
-    integer(int64) :: bytes                                ! smallest possible size of the output
+    integer(int64) :: bytes                                ! minimum size of the output
     character(len=:), allocatable :: size_of_output
 
     call new_simulation(run%input, run%line, run%sim, error, unrelaxed=run%command%check)
@@ -140,12 +141,13 @@ contains
     associate (command => run%command, sim => run%sim)
       call describe_system(run%input%settings, sim)
       found = is_file(source_of(command%output))
-      if (.not. found) found = is_file(command%output)     ! another run may have just given the unfinished output its final name
+      if (.not. found) found = is_file(command%output)     ! renamed by another run meanwhile
       if (found .and. .not. command%check) call run%output%claim(command%output, error)
       if (.not. allocated(error)) call read_checkpoint(command%output, run%input, sim, progress, finished, error)
       if (.not. (found .or. allocated(error))) &
         call fail(error, exit_files, command%output//": another run has just created it; repeat the command later")
-      ! The file already contains a checkpoint of the present state; writing it again would only delay the stop.
+      ! The file already contains a checkpoint of the present state; writing another one would only
+      ! delay the stop.
       if (stop_requested() .and. .not. allocated(error)) &
         call fail(error, exit_stopped, "stopped before the run continued; nothing is lost: repeat the command")
       if (allocated(error)) return
@@ -179,7 +181,7 @@ contains
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: collisions, events
-    real(real64) :: started, ended                         ! [s] of processor time
+    real(real64) :: started, ended                         ! processor time [s]
 
     collisions = run%sim%tally%collisions
     events = run%sim%tally%events
@@ -192,10 +194,11 @@ contains
       run%event_rate = (run%sim%tally%events - events)/duration
     end associate
     run%serial_events = run%evolution%serial_events
-    deallocate (run%evolution)                             ! the completion of the output may need the memory
+    deallocate (run%evolution)                             ! the memory may be needed to complete the output
   end subroutine follow
 
-  !> Wall time of this part of the run, its rate, and its number of serial events, as `output: write_end` expects them.
+  !> Wall time, rate and number of serial events in this part of the run, as required by `output:
+  !> write_end`.
   function cost_of(run) result(cost)
     type(run_t), intent(in) :: run
     real(real64) :: cost(3)
@@ -203,7 +206,8 @@ contains
     cost = [seconds() - run%started, run%rate, real(run%serial_events, real64)]
   end function cost_of
 
-  !> Main loop: advances the simulation from one sample, checkpoint or check to the next, until the end of the run.
+  !> Main loop: advances the simulation from one sample, checkpoint or check to the next, until the
+  !> run ends.
   subroutine main_loop(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
@@ -212,7 +216,7 @@ contains
     integer :: requests, requests_served
     logical :: stopping
     real(real64) :: now, next_checkpoint              ! [s]
-    real(real64) :: first_time                        ! simulated time at the start of this part of the run [time]
+    real(real64) :: first_time      ! simulation time at the start of this part of the run [time]
 
     iterations = 1
     requests_served = 0
@@ -221,8 +225,8 @@ contains
     call run%line%start(run%sim, run%stop_rule, run%started)
     limits%time = run%sim%time()
     call run%output%tighten(limits)
-    ! If no further event can occur, the run ends with a last sample. A run stopped just after this sample and then resumed must
-    ! call `advance_once` to detect its end.
+    ! If no further event can occur, the run ends with a last sample. If the run is stopped just
+    ! after this sample, the resumed run must call `advance_once` to detect its end.
     if (run%sim%events_done .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits
@@ -244,11 +248,11 @@ contains
       if (stopping .or. requests > requests_served .or. now > next_checkpoint) then
         requests_served = requests
         call run%output%save(run%sim, error)
-        if (stop_requested()) stopping = .true.            ! a signal may have requested a stop while `save` was running
+        if (stop_requested()) stopping = .true.            ! a signal may have arrived during `save`
         if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
           written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to continue")
         if (allocated(error)) exit
-        ! the interval until the next checkpoint starts after the request
+        ! the interval until the next checkpoint starts at the request
         next_checkpoint = seconds() + run%input%settings%output%checkpoint_every
       end if
       call run%line%report(run%sim, run%stop_rule)
@@ -257,11 +261,11 @@ contains
     call run%line%clear()
   end subroutine main_loop
 
-  !> Results of the run, as lines of the form `key = value`.
+  !> Results of the run, as lines `key = value`.
   function summary(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
-    real(real64) :: energy(3)                         ! translational, rotational and total energy of the disks [energy]
+    real(real64) :: energy(3)      ! translational, rotational and total energy of the disks [energy]
 
     associate (sim => run%sim)
       energy = energies(sim)
@@ -279,7 +283,7 @@ contains
         eol//"dissipated_energy = "//written(sim%tally%total(dissipated))// &
         eol//"wall_time = "//written(seconds() - run%started)// &
         eol//"collisions_per_second = "//written(run%rate)
-      ! a disk in a billiard collides with boundaries only
+      ! the disk of a billiard collides only with boundaries
       if (sim%tally%collisions == 0) text = text//eol//"events_per_second = "//written(run%event_rate)
       if (run%input%settings%run%threads_asked > 1) text = text//eol//"threads = "//written(run%input%settings%run%threads)
       if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%serial_events)
@@ -292,7 +296,8 @@ contains
     if (note(run) /= "") text = text//eol//"note = "//note(run)
   end function summary
 
-  !> Note about inelastic collapses, and about the end of a run that met no stop rule; empty if neither applies.
+  !> Note about inelastic collapses, and about the end of a run that met no stop rule; empty if
+  !> neither applies.
   function note(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text

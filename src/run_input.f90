@@ -1,5 +1,6 @@
-!> Reads and checks the input of a run, and plans the changes of the system during the run (`&change`). A change, whether planned or
-!> made in a simulation in memory, is described by the input with some values replaced.
+!> Reads and checks the input of a run, and plans the changes of the system during the run
+!> (`&change`). Each change, scheduled or made in a simulation in memory, is described by the input
+!> with some values replaced.
 module run_input
   use box_geometry, only: box_t
   use box_sides, only: bounds
@@ -25,11 +26,11 @@ module run_input
 
 contains
 
-  !> Reads the input file `path`, applies the overrides and checks the input. With `printed`, all readable parts of the input are
-  !> printed, even if the input is invalid.
+  !> Reads the input file `path`, applies the overrides and checks the result. With `printed`, all
+  !> readable parts of the input are printed, even if the input is invalid.
   subroutine read_input(path, overrides, input, error, printed)
     character(len=*), intent(in) :: path
-    type(text_t), intent(in) :: overrides(:)                        !! overrides in the form GROUP.VARIABLE=VALUE
+    type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE for each override
     type(run_input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: printed
@@ -39,7 +40,8 @@ contains
     if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error, printed)
   end subroutine read_input
 
-  !> Version of `read_input` for a text instead of a file; `path` only appears in messages. All problems are collected in one error.
+  !> Version of `read_input` for a text instead of a file; `path` appears only in messages. All
+  !> problems are collected in one error.
   subroutine input_from_text(text, path, overrides, input, error, printed, stepped)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: path
@@ -65,25 +67,24 @@ contains
   !> Converts the groups of an input to settings.
   subroutine resolve_input(input, complete, problems, running, stepped)
     type(run_input_t), intent(inout) :: input
-    logical, intent(inout) :: complete                              !! .false. if parts of the text could not be read
-    type(problem_list_t), intent(inout) :: problems                 !! problems found so far; further problems are added
+    logical, intent(inout) :: complete      !! .false. if part of the text could not be read
+    type(problem_list_t), intent(inout) :: problems                 !! further problems are added to the list
     logical, intent(in) :: running                                  !! see `check_fit`
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
 
-    if (.not. complete) return  ! variables in unreadable parts of the text must not be reported as missing
+    if (.not. complete) return  ! variables in unreadable parts of the text are not missing
     call resolve_settings(input%groups, input%settings, problems, stepped)
     call complete_settings(input%settings, input%groups, problems, complete)
     if (complete) call check_fit(input%settings, input%groups, problems, running)
   end subroutine resolve_input
 
-  !> Determines the system after each of the changes in the input, and reports changes that are not
-  !> possible.
+  !> Determines the system after each change in the input, and reports impossible changes.
   subroutine plan_changes(input, problems, stepped)
     type(run_input_t), intent(inout) :: input
     type(problem_list_t), intent(inout) :: problems
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
     type(run_input_t) :: present_input
-    integer, allocatable :: order(:)                                ! positions of the groups, in the order of the times
+    integer, allocatable :: order(:)                                ! indices of the groups, sorted by time
     integer :: k
 
     if (allocated(input%settings%schedule)) deallocate (input%settings%schedule)
@@ -103,8 +104,8 @@ contains
     end do
   end subroutine plan_changes
 
-  !> Orders the changes by time, and at equal times as in the file. Incomplete changes, and names
-  !> that are invalid or used twice, are reported.
+  !> Sorts the changes by time; simultaneous changes stay in the order of the file. Incomplete
+  !> changes, and names that are invalid or used twice, are reported.
   subroutine order_changes(groups, order, problems)
     type(group_t), intent(in) :: groups(:)
     integer, allocatable, intent(out) :: order(:)
@@ -136,7 +137,7 @@ contains
 
   !> Determines the system after a change.
   subroutine plan_change(before, group, change, problems, stepped)
-    type(run_input_t), intent(inout) :: before                      !! in: input before the change; out: input after the change
+    type(run_input_t), intent(inout) :: before      !! input before the change; on return, after the change
     type(group_t), intent(in) :: group                              !! group of the change
     type(change_t), intent(out) :: change
     type(problem_list_t), intent(inout) :: problems
@@ -175,7 +176,8 @@ contains
     before = after
   end subroutine plan_change
 
-  !> The box of an input. The position of a piston is not known beforehand; it is taken to be at the edge of the box.
+  !> The box of an input. The position of a piston is not known in advance and is assumed to be at
+  !> the edge of the box.
   function foreseen_box(input) result(box)
     type(run_input_t), intent(in) :: input
     type(box_t) :: box
@@ -187,12 +189,12 @@ contains
     end do
   end function foreseen_box
 
-  !> Changes values of an input. A side with a new motion starts it from its present position.
+  !> Changes values of an input. A side with a new motion starts it at its present position.
   subroutine changed_input(before, lines, box, t, after, problems, stepped)
     type(run_input_t), intent(in) :: before
-    type(text_t), intent(in) :: lines(:)                            !! changes in the form GROUP.VARIABLE=VALUE
-    type(box_t), intent(in) :: box                                  !! box before the change, with the positions of the sides
-    real(real64), intent(in) :: t                                   !! time relative to the time origin `box%epoch` [time]
+    type(text_t), intent(in) :: lines(:)      !! changes of the form GROUP.VARIABLE=VALUE
+    type(box_t), intent(in) :: box      !! box before the change, with the positions of the sides
+    real(real64), intent(in) :: t                                   !! time relative to `box%epoch` [time]
     type(run_input_t), intent(out) :: after
     type(problem_list_t), intent(inout) :: problems
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
@@ -206,7 +208,8 @@ contains
     call resolve_input(after, complete, problems, .true., stepped)
   end subroutine changed_input
 
-  !> Replaces an input by one for the system after the first scheduled changes, without these changes.
+  !> Replaces an input by the input for the system after the first scheduled changes, which are then
+  !> no longer scheduled.
   subroutine fold_changes(input, made, box, error)
     type(run_input_t), intent(inout) :: input
     integer(int64), intent(in) :: made                              !! number of changes
@@ -232,7 +235,8 @@ contains
     do g = 1, size(after%groups)
       associate (group => after%groups(g), schedule => input%settings%schedule)
         if (group%name == "change" .and. any([(schedule(k)%name == group%instance, k=1, int(made))])) cycle
-        if (group%name == "change") group%values(v)%given = .true.  ! the number of a change may differ from its name
+        ! the number of a change may differ from its name
+        if (group%name == "change") group%values(v)%given = .true.
         n = n + 1
         left(n) = group
       end associate
@@ -247,7 +251,8 @@ contains
     if (.not. allocated(error)) input = after
   end subroutine fold_changes
 
-  !> Sets the variable `position` of each side to its value in the box, which depends on the course of the simulation.
+  !> Sets the variable `position` of each side to its value in the box, which depends on the
+  !> simulation so far.
   subroutine move_sides(groups, box)
     type(group_t), intent(inout) :: groups(:)
     type(box_t), intent(in) :: box
@@ -268,7 +273,7 @@ contains
     end do
   end subroutine move_sides
 
-  !> Whether the motion of a side has the variable `position`.
+  !> True if the motion of a side has the variable `position`.
   pure function has_position(side) result(yes)
     type(group_t), intent(in) :: side
     logical :: yes
@@ -278,20 +283,21 @@ contains
     end associate
   end function has_position
 
-  !> Name of the variable of a change that may not change in a running simulation; empty if it may. Unknown variables are reported
-  !> by `read_groups` instead.
+  !> Name of the variable of a change that must not change in a running simulation; empty if it may.
+  !> Unknown variables are reported by `read_groups` instead.
   pure function fixed_variable(line) result(name)
-    character(len=*), intent(in) :: line              !! change in the form GROUP.VARIABLE=VALUE
+    character(len=*), intent(in) :: line              !! change of the form GROUP.VARIABLE=VALUE
     character(len=:), allocatable :: name, plain
 
     name = ""
     plain = lower_case(trim(adjustl(line(:index(line, "=") - 1))))
-    plain = plain(:index(plain//"(", "(") - 1)        ! removes the index of an element: box.gravity(2) becomes box.gravity
+    plain = plain(:index(plain//"(", "(") - 1)        ! box.gravity(2) becomes box.gravity
     if (row_of(plain(:index(plain, ".") - 1), plain(index(plain, ".", back=.true.) + 1:)) == 0) return
     if (change_of(plain) /= in_motion) name = line(:index(line, "=") - 1)
   end function fixed_variable
 
-  !> Whether a changed input has the same values as the present one. A side without a group in the present input has default values.
+  !> True if a changed input has the same values as the present one. A side without a group in the
+  !> present input has default values.
   function changes_nothing(before, after, stepped) result(yes)
     type(run_input_t), intent(in) :: before, after
     logical, intent(in), optional :: stepped          !! see `resolve_settings`
@@ -315,8 +321,8 @@ contains
     if (yes) yes = same_values(present_input%groups, after%groups)
   end function changes_nothing
 
-  !> Drops the variables of a side that have no effect with its new motion, such as the force on a piston that is now held.
-  !> Variables set by the change itself are kept and reported.
+  !> Drops the variables of a side that have no effect with its new motion, such as the force on a
+  !> former piston. Variables set by the change itself are kept, and reported as an error.
   subroutine drop_former_motion(before, groups)
     type(group_t), intent(in) :: before(:)            !! groups of the present input
     type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
@@ -328,22 +334,23 @@ contains
       if (before(old)%text_of("motion") == groups(g)%text_of("motion")) cycle
       do v = 1, size(groups(g)%values)
         associate (slot => groups(g)%values(v), words => words_of(table(groups(g)%values(v)%row)%goes_with))
-          if (.not. any(words == "motion") .or. slot%line < 0) cycle    ! an override has a negative line number
+          if (.not. any(words == "motion") .or. slot%line < 0) cycle    ! overrides have negative line numbers
           slot%given = slot%given .and. any(words == groups(g)%text_of("motion"))
         end associate
       end do
     end do
   end subroutine drop_former_motion
 
-  !> Sets the positions of all sides with a new motion, so that each starts from its present position.
+  !> Sets the position of each side with a new motion, so that the motion starts at the present
+  !> position of the side.
   subroutine keep_sides(before, groups, box, t)
     type(group_t), intent(in) :: before(:)            !! groups of the present input
     type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
     type(box_t), intent(in) :: box                    !! see `changed_input`
     real(real64), intent(in) :: t                     !! see `changed_input`
     character(len=10), parameter :: of_motion(4) = [character(len=10) :: "motion", "velocity", "start_time", "end_time"]
-    ! Positions of the sides (axis, lower or upper) and of one side [length], time when a motion starts and its duration so far
-    ! [time]
+    ! Positions of the sides (axis, lower or upper) and of one side [length]; time when a motion
+    ! starts, and its duration so far [time]
     real(real64) :: at(2, 2), x, start, passed
     integer :: g, k, old, side, inwards
     logical :: same

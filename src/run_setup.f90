@@ -1,5 +1,5 @@
 !> Sets up a run: creates the initial state and the objects selected by the input, and starts the
-!> threads. Only this module depends on all kinds of neighbour search and dynamics.
+!> threads. Only this module depends on all types of neighbour search and dynamics.
 module run_setup
   use errors, only: error_t
   use event_driven, only: event_driven_t
@@ -23,8 +23,8 @@ module run_setup
 
 contains
 
-  !> Creates the initial state of a run, with disks sorted so that neighbours in space are close in
-  !> memory.
+  !> Creates the initial state of a run. The disks are sorted so that neighbours in space are close
+  !> in memory.
   subroutine new_simulation(input, line, sim, error, unrelaxed)
     type(run_input_t), intent(inout) :: input
     class(status_line_t), intent(inout) :: line
@@ -70,10 +70,11 @@ contains
     end if
   end subroutine choose_evolution
 
-  !> Starts the threads, which exist until the run ends; a run on the serial engine has only one.
+  !> Starts the threads, which exist until the run ends. A run on the serial engine has only one
+  !> thread.
   subroutine start_threads(settings, warning)
     type(settings_t), intent(inout) :: settings
-    !> Warning about a probably unintended number of threads; empty if there is none.
+    !> Warning about a probably unintended number of threads; empty if the number is plausible.
     character(len=:), allocatable, intent(out) :: warning
     character(len=:), allocatable :: name
     integer :: cores
@@ -99,10 +100,10 @@ contains
     call make_team(settings%run%threads)
   end subroutine start_threads
 
-  !> Determines the number of threads from the input or the environment; by default one.
+  !> Determines the number of threads from the input or the environment; the default is one.
   subroutine ask(threads, name)
-    !> On entry, the number of threads in the input, or 0 if there is none; on return, the number to
-    !> use
+    !> On entry, the number of threads in the input, or 0 if it is not set; on return, the number to
+    !> be used.
     integer, intent(inout) :: threads
     character(len=:), allocatable, intent(out) :: name
     character(len=16) :: value
