@@ -1,10 +1,10 @@
-!> Calendar: the part of the event queue for events of later times. Time is divided into windows of equal length. The next windows
-!> have a bucket each: an array that fills one cache line. Later times are divided into spans of many windows, each with an
-!> unordered list of events.
+!> Calendar: the part of the event queue for later events. Time is divided into windows of equal
+!> length. Each of the next windows has a bucket, an array that fills one cache line. Later times
+!> are divided into spans of many windows, each with an unordered list of events.
 !>
-!> New entries are appended at the end, which accesses few cache lines. Entries of particular disks are never searched for, and
-!> single entries never removed. All lists share one array, divided into chunks; those of a list are reused once its span has been
-!> processed.
+!> New entries are appended at the end, which accesses few cache lines. Entries of a particular disk
+!> are never searched for, and single entries are never removed. All lists share one array, divided
+!> into chunks; the chunks of a list are reused once its span has been processed.
 module calendar
   use kinds, only: int32, real64
   use disks, only: tag_t
@@ -13,50 +13,58 @@ module calendar
   public :: bucket_capacity, bucket_t, calendar_t, events_per_window, filed_t, most_coming, stages, window_none
 
   integer(int32), parameter :: bucket_capacity = 15
-  !> Intended mean number of events in a window. With fewer, more empty windows would be processed; with more, the small buckets
-  !> would overflow more often, and more events would go to the heap.
+  !> Intended mean number of events in a window. With fewer events, more empty windows would have to
+  !> be processed; with more, the small buckets would overflow more often, and more events would be
+  !> stored in the heap.
   real(real64), parameter :: events_per_window = 4.0_real64
-  integer(int32), parameter :: few_disks = 5000    !! number of disks up to which nearly all events fit into buckets
-  !> Distance, in windows, between the current window and the last one prefetched, for each stage of prefetching.
+  !> Number of disks up to which nearly all events fit into buckets.
+  integer(int32), parameter :: few_disks = 5000
+  !> Distance, in windows, from the current window to the last prefetched one, for each stage of
+  !> prefetching.
   integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]
   integer(int32), parameter :: stages = size(windows_ahead)
   integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity
-    !! largest number of disks in the list that one stage of prefetching makes
-  integer(int32), parameter :: window_none = -1    !! value of tag%window if the event is not in the calendar
+    !! maximum number of disks listed by one stage of prefetching
+  integer(int32), parameter :: window_none = -1    !! value of tag%window for events outside the calendar
 
-  type :: bucket_t                                 ! one cache line
+  type :: bucket_t                                 ! fills one cache line
     integer(int32) :: n = 0
     integer(int32) :: disk(bucket_capacity)
   end type bucket_t
 
   integer(int32), parameter :: log_chunk = 7
-  !> Number of entries in a chunk, a part of a list that occupies 1 KiB. Its first entry is a link to another chunk of the same
-  !> list.
+  !> Number of entries in a chunk, a part of a list that occupies 1 KiB. The first entry is a link
+  !> to another chunk of the same list.
   integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)
   integer(int32), parameter :: none = -1
 
-  !> An entry: a disk and the window of its event. In the link at the start of a chunk, `disk` is the number of the previous chunk
-  !> of the list.
+  !> An entry: a disk and the window of its event. In the link at the start of a chunk, `disk` is
+  !> the number of the previous chunk of the list.
   type :: filed_t
     integer(int32) :: disk
     integer(int32) :: window
   end type filed_t
 
   type :: calendar_t
-    type(bucket_t), allocatable :: bucket(:)       !! (0:last_bucket) circular buffer of the buckets of the next windows
-    !> (0:last_span) position in `filed` after the last entry in the list of each span; 0 for an empty list. A span has half as many
-    !> windows as there are buckets. Like `bucket`, this is a circular buffer, so that a list can also contain events of later spans
-    !> that use the same element.
+    !> Circular buffer with the buckets of the next windows; indices 0:last_bucket.
+    type(bucket_t), allocatable :: bucket(:)
+    !> Position in `filed` after the last entry in the list of each span; 0 for an empty list;
+    !> indices 0:last_span. A span has half as many windows as there are buckets. Since the array is
+    !> a circular buffer, like `bucket`, a list can also contain events of later spans with the same
+    !> index.
     integer(int32), allocatable :: list_end(:)
-    !> (0:) the chunks of all lists, each with a link to the previous chunk of the same list
+    !> Chunks of all lists, each with a link to the previous chunk of the same list; indices from 0.
     type(filed_t), allocatable :: filed(:)
-    integer(int32) :: n_chunks = 0                 !! number of chunks that have been used
-    integer(int32) :: vacant = none                !! number of the first chunk in the list of free chunks
-    integer(int32) :: last_bucket = 0              !! largest index of a bucket, which is also the bit mask for window numbers
-    integer(int32) :: last_span = 0                !! largest index of a span, which is also the bit mask for span numbers
-    integer(int32) :: log_span = 0                 !! binary logarithm of the number of windows in a span
-    integer(int32) :: ring_end = 0                 !! first window that has no bucket yet
-    integer(int32) :: announced(stages) = 0        !! for each stage of prefetching, the last window whose disks have been listed
+    integer(int32) :: n_chunks = 0                 !! number of chunks used so far
+    integer(int32) :: vacant = none                !! first chunk in the list of free chunks
+    !> Maximum index of a bucket; also the bit mask for window numbers.
+    integer(int32) :: last_bucket = 0
+    !> Maximum index of a span; also the bit mask for span numbers.
+    integer(int32) :: last_span = 0
+    integer(int32) :: log_span = 0                 !! binary logarithm of the number of windows per span
+    integer(int32) :: ring_end = 0                 !! first window without a bucket
+    !> For each stage of prefetching, the last window whose disks were listed.
+    integer(int32) :: announced(stages) = 0
   contains
     procedure :: empty
     procedure :: begin
@@ -65,14 +73,16 @@ module calendar
     procedure :: span_begins
     procedure :: open_span
     procedure :: list_coming
-    procedure, private :: add_chunk  ! type-bound, so that the compiler does not inline the procedure into the hot path
+    procedure, private :: add_chunk  ! type-bound, so that the compiler does not inline it into the hot path
   end type calendar_t
 
 contains
 
-  !> Empties the calendar, and chooses the numbers of buckets and spans. On average, all windows together hold at least 2n events,
-  !> so that most events of n disks fit into the calendar. For many disks the number of buckets is limited, so that buckets and
-  !> disks fit into the cache together. Equal numbers of buckets and spans minimise the number of cache lines written to.
+  !> Empties the calendar and chooses the numbers of buckets and spans. On average, all windows
+  !> together contain at least 2n events, so that most events of n disks fit into the calendar. For
+  !> many disks the number of buckets is limited, so that buckets and disks fit into the cache
+  !> together. Equal numbers of buckets and spans minimise the number of cache lines that are
+  !> written.
   subroutine empty(self, n)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: n                !! number of disks
@@ -94,7 +104,7 @@ contains
     end if
     if (.not. allocated(self%bucket)) then
       allocate (self%bucket(0:self%last_bucket), self%list_end(0:self%last_span))
-      ! The operating system allocates memory only for the part of the array in use.
+      ! The operating system provides memory only for the part of the array in use.
       allocate (self%filed(0:chunk*(self%last_span + 1 + 2*n/chunk) - 1))
     end if
     self%bucket%n = 0
@@ -112,8 +122,8 @@ contains
     self%announced = window
   end subroutine begin
 
-  !> Adds a disk to the bucket of a window between the current window and `ring_end`, unless the
-  !> bucket is full.
+  !> Adds a disk to the bucket of a window between the current window and `ring_end`. If the bucket
+  !> is full, nothing is added.
   subroutine put_near(self, i, window, full)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: i, window
@@ -143,10 +153,11 @@ contains
     self%list_end(s) = place + 1
   end subroutine put_far
 
-  !> Appends a chunk to the list whose last entry precedes the position `place`.
+  !> Appends a chunk to the list whose last entry is just before the position `place`.
   subroutine add_chunk(self, place)
     class(calendar_t), intent(inout) :: self
-    !> in: position after the last entry of the list; out: position of the first entry in the new chunk.
+    !> On entry, the position after the last entry of the list; on return, the position of the first
+    !> entry in the new chunk.
     integer(int32), intent(inout) :: place
     type(filed_t), allocatable :: more(:)
     integer(int32) :: c
@@ -167,7 +178,7 @@ contains
     place = chunk*c + 1
   end subroutine add_chunk
 
-  !> Whether a window is the first of a span.
+  !> True if a window is the first of a span.
   pure function span_begins(self, window) result(yes)
     class(calendar_t), intent(in) :: self
     integer(int32), intent(in) :: window
@@ -176,13 +187,14 @@ contains
     yes = iand(window, shiftl(1_int32, self%log_span) - 1) == 0
   end function span_begins
 
-  !> Moves the events of the next span into their buckets. Valid events of later spans in the same list stay there. Disks whose
-  !> buckets are full are returned in `surplus`.
+  !> Moves the events of the next span to their buckets. Valid events of later spans in the same
+  !> list remain there. Disks whose buckets are full are returned in `surplus`.
   subroutine open_span(self, tag, n_surplus, surplus)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(out) :: n_surplus
-    integer(int32), allocatable, intent(inout) :: surplus(:)     !! (n_surplus) disks whose buckets are full
+    !> Disks whose buckets are full; size at least n_surplus.
+    integer(int32), allocatable, intent(inout) :: surplus(:)
     type(filed_t) :: filed
     integer(int32) :: s, c, k, list_end, before
     logical :: full
@@ -213,16 +225,18 @@ contains
     end do
   end subroutine open_span
 
-  !> Lists disks with probable events in the next windows, for one stage of prefetching. Each stage lists the disks of a window
-  !> exactly once. The first stage is farthest ahead of the current window; later stages are closer, and omit disks whose entries
-  !> have become invalid.
+  !> Lists disks that probably have events in the next windows, for one stage of prefetching. Each
+  !> stage lists the disks of a window exactly once. The first stage is farthest ahead of the
+  !> current window; later stages are closer and omit disks whose entries have meanwhile become
+  !> invalid.
   subroutine list_coming(self, tag, window, stage, n, disks)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(in) :: window           !! current window
     integer(int32), intent(in) :: stage
     integer(int32), intent(out) :: n
-    integer(int32), intent(out) :: disks(most_coming)    !! (n) disks with probable events in the next windows
+    !> The n disks that probably have events in the next windows.
+    integer(int32), intent(out) :: disks(most_coming)
     integer(int32) :: w, last, k
     logical :: valid
 

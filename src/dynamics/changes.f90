@@ -1,6 +1,6 @@
-!> Changes a running simulation: forces, contact laws, motions of sides, positions and velocities. Each change takes effect at the
-!> present time for all disks at once, and the resulting change of the energy counts as work. Scheduled changes are made by
-!> `timeline` when they are due.
+!> Changes a running simulation: forces, contact laws, motions of sides, positions and velocities.
+!> Each change is applied to all disks at the present time, and the resulting change of the energy
+!> is counted as work. Scheduled changes are made by `timeline` when they are due.
 module changes
   use box_geometry, only: box_t
   use box_sides, only: bounds
@@ -21,7 +21,7 @@ module changes
 
 contains
 
-  !> Makes the next of the scheduled changes.
+  !> Makes the next scheduled change.
   subroutine make_scheduled_change(sim, error)
     type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(out) :: error
@@ -50,13 +50,13 @@ contains
     end do
   end function text_of_change
 
-  !> Replaces box, contact law and driving of a simulation by those of another input with the same disks, at the present time. Sides
-  !> start new motions from their present positions: the old and the new law of motion must give the same position at the present
-  !> time.
+  !> Replaces box, contact law and driving of a simulation, at the present time, by those of another
+  !> input with the same disks. Sides start new motions from their present positions: at the present
+  !> time, the old and the new law of motion must give the same position.
   subroutine change_system(sim, system, problem)
     type(simulation_t), intent(inout) :: sim
     type(system_t), intent(in) :: system
-    !> Reason why the system cannot be replaced; empty if the system has been replaced.
+    !> Reason why the system was not replaced; empty after success.
     character(len=:), allocatable, intent(out) :: problem
     type(simulation_t) :: other
     real(real64) :: before                                   ! energy before the change [energy]
@@ -69,7 +69,7 @@ contains
     other%features%own_sizes = sim%features%own_sizes
     other%box%epoch = sim%box%epoch
     call continue_sides(sim%box, other%box, sim%now)
-    do k = 1, n_sides                                        ! a new piston has the position and velocity of the previous side
+    do k = 1, n_sides      ! a new piston keeps the side's position and velocity
       if (.not. other%box%side(k)%is_piston()) cycle
       associate (state => other%box%side(k)%state)
         state%position = sim%box%side_position(k, sim%now)
@@ -97,8 +97,8 @@ contains
     call book(sim, before)
   contains
 
-    !> Sets `kicks` to the number of kicks that the new driving would have applied since the start of the run; time and random
-    !> numbers of the next kick depend on this number.
+    !> Sets `kicks` to the number of kicks that the new driving would have applied since the start
+    !> of the run. This number determines the time and the random numbers of the next kick.
     subroutine count_kicks()
       if (.not. allocated(sim%drive)) return
       sim%kicks = int(min(sim%time()/sim%drive%interval, 2.0_real64**62), int64)
@@ -111,7 +111,8 @@ contains
     end subroutine count_kicks
   end subroutine change_system
 
-  !> Reason why an open side cannot be closed: a disk overlaps it. Empty if no such side is being closed.
+  !> Reason why an open side cannot be closed: a disk overlaps it. Empty if every side that is being
+  !> closed is free.
   pure function disk_in_the_way(sim, box) result(problem)
     type(simulation_t), intent(in) :: sim
     type(box_t), intent(in) :: box                           !! box after the change
@@ -139,7 +140,8 @@ contains
       //" overlaps the line of the side, which can be closed only when no disk does"
   end function disk_in_the_way
 
-  !> Reason why the disks lack data needed by another system; empty if they do not.
+  !> Data required by another system that the disks lack, as part of a message; empty if nothing is
+  !> missing.
   pure function missing_data(one, other) result(problem)
     type(system_t), intent(in) :: one, other
     character(len=:), allocatable :: problem
@@ -153,11 +155,11 @@ contains
         //"drive.kind = 'recycle' must be there from the start"
   end function missing_data
 
-  !> Starts new motions of sides from their present positions; unchanged motions continue.
+  !> Starts new motions of sides from their present positions. Unchanged motions continue.
   pure subroutine continue_sides(before, after, t)
     type(box_t), intent(in) :: before
     type(box_t), intent(inout) :: after
-    real(real64), intent(in) :: t                            !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: t                            !! relative to `box%epoch` [time]
 
     call after%side%follow(before%side, before%epoch, t)
   end subroutine continue_sides
@@ -165,8 +167,9 @@ contains
   !> Sets the velocities of all disks.
   subroutine change_velocities(sim, v)
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: v(:, :)                      !! (2,n) new velocities in the order of ids [length/time]
-    real(real64) :: before, old(2)                           ! energy before the change [energy], old velocity [length/time]
+    !> New velocities in the order of ids; shape (2, n) [length/time].
+    real(real64), intent(in) :: v(:, :)
+    real(real64) :: before, old(2)      ! energy before the change [energy]; old velocity [length/time]
     integer(int32) :: i
 
     before = total_energy(sim)
@@ -182,12 +185,13 @@ contains
     call book(sim, before)
   end subroutine change_velocities
 
-  !> Sets the positions of all disks, without a test for overlaps. Positions beyond a periodic side belong to periodic images of the
-  !> disks.
+  !> Sets the positions of all disks, without testing for overlaps. A position beyond a periodic
+  !> side belongs to a periodic image of the disk.
   subroutine change_positions(sim, x)
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: x(:, :)                      !! (2,n) new positions in the order of ids [length]
-    ! Energy before the change [energy], old position [length], velocity [length/time]
+    !> New positions in the order of ids; shape (2, n) [length].
+    real(real64), intent(in) :: x(:, :)
+    ! Energy before the change [energy]; old position [length]; velocity [length/time]
     real(real64) :: before, old(2), v(2), image(2)
     integer(int32) :: i
 
@@ -199,7 +203,7 @@ contains
       if (any(sim%box%periodic)) image = sim%extra(i)%image
       old = sim%disk(i)%x
       v = sim%disk(i)%v
-      call wrap(sim, old, v, image)                          ! shifts the old position by whole periods into the box
+      call wrap(sim, old, v, image)      ! shifts the old position by whole periods into the box
       sim%disk(i)%x = x(:, sim%tag(i)%id)
       call wrap(sim, sim%disk(i)%x, v, image)
       if (any(sim%box%periodic)) sim%extra(i)%image = image
@@ -208,9 +212,10 @@ contains
     call book(sim, before)
   end subroutine change_positions
 
-  !> Advances all disks to the present time under the previous forces, so that all clocks are equal, and erases the last collision
-  !> partners. With its new velocity, a disk may collide with its last partner again immediately, which would otherwise be mistaken
-  !> for a rounding error of the previous collision.
+  !> Advances all disks to the present time under the old forces, so that all clocks are equal, and
+  !> erases their last collision partners. With its new velocity a disk may collide with its last
+  !> partner again immediately; without the erasure, this collision would be mistaken for a rounding
+  !> error of the previous one.
   subroutine advance_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
@@ -223,14 +228,14 @@ contains
     end do
   end subroutine advance_all
 
-  !> Counts the change of the total energy since `before` as work on the disks. The units of the exact sums are chosen as in a run
-  !> that starts with the new system.
+  !> Counts the change of the total energy since `before` as work on the disks. The units of the
+  !> exact sums are chosen as in a run that starts with the new system.
   subroutine book(sim, before)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: before                       !! total energy before the change [energy]
 
     sim%changes = sim%changes + 1
-    if (.not. sim%has_collapsed()) sim%tally%collapse = never       ! the change prevents a collapse that was about to occur
+    if (.not. sim%has_collapsed()) sim%tally%collapse = never       ! the change prevents an imminent collapse
     if (allocated(sim%series)) sim%series%known_until = 0
     sim%typical_speed2 = max(sim%typical_speed2, sim%mean_square_speed())
     call sim%choose_units()

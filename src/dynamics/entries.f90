@@ -1,5 +1,6 @@
-!> Entry of waiting disks into the box through sources. The random numbers of an entry depend only on the seed, the source, the id
-!> of the disk and the number of the multiple of the interval.
+!> Entry of waiting disks into the box through sources. The random numbers of an entry depend only
+!> on the seed, the source, the id of the disk, and the number of intervals of the source since the
+!> start of the run.
 module entries
   use kinds, only: int32, int64, never, real64
   use encounters, only: energy_of
@@ -30,7 +31,8 @@ contains
     if (sound) call check_cover(fields, "region", source%region, box)
   end subroutine check_source
 
-  !> Time of the next action of source s; `never` if no disk of its species is waiting or the source ends before.
+  !> Time when source s acts next; `never` if no disk of its species is waiting, or if the source
+  !> ends earlier.
   pure function entry_time(sim, s) result(t)
     type(simulation_t), intent(in) :: sim
     integer, intent(in) :: s                                 !! index of the source
@@ -45,7 +47,7 @@ contains
     end associate
   end function entry_time
 
-  !> Whether any source can still let a disk enter.
+  !> True if any source can still let a disk enter.
   pure function awaits_entry(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -58,15 +60,15 @@ contains
     end do
   end function awaits_entry
 
-  !> Lets disks enter through source s at its next time. The waiting disks try in the order of their ids, until as many as the
-  !> source allows have found a free position.
+  !> Lets disks enter through source s at its next time. The waiting disks are tried in the order of
+  !> their ids, until the maximum number of disks for this source have found a free position.
   subroutine let_disks_enter(sim, s, entered)
     type(simulation_t), intent(inout) :: sim
     integer, intent(in) :: s                                 !! index of the source
-    integer(int32), allocatable, intent(out) :: entered(:)   !! indices of the disks that have entered
+    integer(int32), allocatable, intent(out) :: entered(:)   !! indices of the disks that entered
     type(packing_t) :: packing
     type(random_stream_t) :: stream
-    integer(int32), allocatable :: waiting(:)                ! indices of the disks
+    integer(int32), allocatable :: waiting(:)                ! indices of the waiting disks
     real(real64) :: x(2)                                     ! [length]
     integer(int64) :: k, key
     integer(int32) :: j, n
@@ -97,8 +99,9 @@ contains
     entered = entered(:n)
   end subroutine let_disks_enter
 
-  !> Lets disk i enter at a free position, either with the velocity of the source and without rotation, or with velocity and
-  !> rotation drawn from the Maxwell distribution. The disk keeps its orientation.
+  !> Lets disk i enter at a free position, either with the velocity of the source and without
+  !> rotation, or with velocity and rotation from the Maxwell distribution. The orientation of the
+  !> disk is kept.
   subroutine enter(sim, source, i, x, stream)
     type(simulation_t), intent(inout) :: sim
     type(source_t), intent(in) :: source

@@ -1,5 +1,6 @@
-!> Divides a run into epochs. At the end of an epoch the time origin moves, and the state is tested for an inelastic collapse. Both
-!> depend on the state of the simulation alone, not on the search, the queue or the number of threads.
+!> Divides a run into epochs. At the end of an epoch the time origin moves, and the state is tested
+!> for an inelastic collapse. Both depend only on the state of the simulation, and not on the
+!> search, the queue or the number of threads.
 module epochs
   use box_sides, only: separate_from_sides
   use kinds, only: int32, int64, never, pi, real64
@@ -12,27 +13,32 @@ module epochs
   public :: are_crushed, restart_epoch, begin_first_epoch, ends_by_event, ends_by_kick, is_at_rest, last_time, most_events
   public :: disk_on_side, has_come_to_rest, move_epoch, stands_still
 
-  !> Intended number of collisions per disk in an epoch. Moving the time origin at its end preserves
-  !> the precision of times.
+  !> Intended number of collisions per disk in an epoch. Moving the time origin at the end of each
+  !> epoch preserves the precision of times.
   integer(int64), parameter :: epoch_length = 24
-  !> Number of significant bits in a shift of the time origin: so few that adding shifts causes no rounding errors.
+  !> ^number of significant bits in a shift of the time origin, small enough for shifts to be added
+  !> without rounding errors
   integer, parameter :: significant_bits = 20
   !> A collapse is reported if time does not advance during at least `collapse_length` events, and
   !> at least `collapse_length_per_disk` events per disk.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
-  real(real64), parameter :: shortest = 2.0_real64**(-20)  !! shortest epoch in units of `negligible_time`
+  !> Minimum duration of an epoch, in units of `negligible_time`.
+  real(real64), parameter :: shortest = 2.0_real64**(-20)
   real(real64), parameter :: last_time = 0.5_real64*never
-  real(real64), parameter :: crushing = 1.0e6_real64 !! growth factor of the energy above which disks are considered crushed
-  real(real64), parameter :: densest = 0.9_real64  !! largest packing fraction used in the estimate of the event rate
-  !> Largest factor by which a single event may increase the speed of the fastest disk, and largest number of box edges that a disk
-  !> may then travel in an epoch. A kick ends the epoch if a disk at its new speed would have travelled farther since the time
-  !> origin, because rounding errors of the time would displace it noticeably.
+  !> Factor of energy growth above which disks are considered crushed.
+  real(real64), parameter :: crushing = 1.0e6_real64
+  !> Maximum packing fraction in the estimate of the event rate.
+  real(real64), parameter :: densest = 0.9_real64
+  !> Maximum factor by which a single event may increase the speed of the fastest disk, and maximum
+  !> number of box edges that a disk may then travel in an epoch. A kick ends the epoch if a disk
+  !> would have travelled farther since the time origin at its new speed, because rounding errors of
+  !> the time would displace it noticeably.
   real(real64), parameter :: farthest = 1.0e3_real64
 
 contains
 
-  !> Chooses the length of the first epoch from an estimate of the event rate, and sets `negligible_time`, in which no disk moves
-  !> noticeably.
+  !> Chooses the length of the first epoch from an estimate of the event rate, and sets
+  !> `negligible_time`, in which no disk moves noticeably.
   pure subroutine begin_first_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: mean                           ! mean squared speed [length**2/time**2]
@@ -51,8 +57,8 @@ contains
     sim%events_then = sim%tally%events
   contains
 
-    !> Mean number of events of a disk per length of its path: collisions with walls, and with other disks according to Henderson's
-    !> equation of state (Molecular Physics 30, 971 (1975)).
+    !> Mean number of events of a disk per path length: collisions with walls, and with other disks
+    !> according to Henderson's equation of state (Molecular Physics 30, 971 (1975)).
     pure function events_per_path() result(rate)
       real(real64) :: rate                           !! [1/length]
       real(real64) :: packing
@@ -90,14 +96,15 @@ contains
     sim%epoch_events = sim%tally%events
   end subroutine begin_epoch
 
-  !> Ends the epoch and moves the time origin to about the present time, which preserves the precision of times. All events must
-  !> then be predicted anew, so this is also when the disks are sorted by cells. The next epoch ends at a fixed time instead of a
-  !> fixed number of events, so that domains can end it independently at the same time. If a single event or a kick has ended the
-  !> epoch (see `ends_by_event` and `ends_by_kick`), a disk can be much faster than before, and the time origin moves exactly to the
-  !> present time.
+  !> Ends the epoch and moves the time origin to about the present time, which preserves the
+  !> precision of times. Afterwards all events must be predicted anew, so this is also when the
+  !> disks are sorted by cells. The next epoch ends at a fixed time instead of a fixed number of
+  !> events, so that domains can end it independently at the same time. If the epoch was ended by a
+  !> single event or a kick (see `ends_by_event` and `ends_by_kick`), a disk can be much faster than
+  !> before, and the time origin moves exactly to the present time.
   subroutine move_epoch(sim, is_urgent)
     type(simulation_t), intent(inout) :: sim
-    logical, intent(in) :: is_urgent               !! whether a single event or a kick has ended the epoch
+    logical, intent(in) :: is_urgent               !! whether the epoch was ended by a single event or a kick
     real(real64) :: shift, length
 
     if (sim%now - sim%last_advance >= sim%negligible_time) then
@@ -117,9 +124,10 @@ contains
     call begin_epoch(sim, length)
   end subroutine move_epoch
 
-  !> Ends the epoch after a change of the disks, the forces or the contact laws, moving the time origin exactly to the present time.
-  !> Disks can be much faster after such a change, so the length of the next epoch is determined when the evolution starts.
-  !> Time-stepped dynamics has no epochs and is not affected.
+  !> Ends the epoch after a change of the disks, the forces or the contact laws, and moves the time
+  !> origin exactly to the present time. Since disks can be much faster after such a change, the
+  !> length of the next epoch is determined when the evolution starts. Time-stepped dynamics has no
+  !> epochs and is not affected.
   subroutine restart_epoch(sim)
     type(simulation_t), intent(inout) :: sim
 
@@ -129,7 +137,7 @@ contains
     sim%epoch_end = 0
   end subroutine restart_epoch
 
-  !> Moves the time origin `box%epoch` by `shift`. All events must then be predicted anew.
+  !> Moves the time origin `box%epoch` by `shift`. Afterwards all events must be predicted anew.
   subroutine move_origin(sim, shift)
     type(simulation_t), intent(inout) :: sim
     real(real64), value :: shift                    !! [time]
@@ -151,8 +159,9 @@ contains
     end do
   end subroutine move_origin
 
-  !> Number of events since the start of the run at which the epoch ends early: only if the event rate is far higher than expected,
-  !> for example before an inelastic collapse.
+  !> Number of events, since the start of the run, at which the epoch ends early. This limit is
+  !> reached only if the event rate is far higher than expected, for example before an inelastic
+  !> collapse.
   pure function most_events(sim) result(n)
     type(simulation_t), intent(in) :: sim
     integer(int64) :: n
@@ -160,13 +169,14 @@ contains
     n = sim%epoch_events + 2*events_per_epoch(sim)
   end function most_events
 
-  !> Whether the first event ends the epoch, because it can make a disk so fast that the time since the time origin is too inexact.
-  !> Slow disks become fast if they are rough and rotate fast, or if they reach a moving or hot boundary. Since the result must
-  !> depend on the state alone, it is .false. if velocities also change without events.
+  !> True if the first event ends the epoch, because it can make a disk so fast that the time since
+  !> the time origin is too inexact. Slow disks become fast if they are rough and rotate fast, or if
+  !> they reach a moving or hot boundary. Since the result must depend only on the state, it is
+  !> .false. if velocities also change without events.
   pure function ends_by_event(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
-    real(real64) :: possible                       ! highest speed that an event can cause [length/time]
+    real(real64) :: possible                       ! maximum speed that an event can cause [length/time]
     integer(int32) :: i
 
     yes = .false.
@@ -178,12 +188,13 @@ contains
     if (possible*sim%epoch_end > farthest*maxval(sim%box%edges())) yes = possible > farthest*fastest_disk(sim)
   end function ends_by_event
 
-  !> Whether a kick ends the epoch, because it has made a disk so fast that the time since the time origin is too inexact.
+  !> True if a kick ends the epoch, because it has made a disk so fast that the time since the time
+  !> origin is too inexact.
   pure function ends_by_kick(sim, kicked) result(yes)
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: kicked(:)        !! (n) indices of the disks that the kick has accelerated
+    integer(int32), intent(in) :: kicked(:)        !! indices of the disks accelerated by the kick
     logical :: yes
-    real(real64) :: fastest2                       ! largest squared speed [length**2/time**2]
+    real(real64) :: fastest2                       ! maximum squared speed [length**2/time**2]
     integer(int32) :: k
 
     yes = .false.
@@ -207,8 +218,8 @@ contains
     end do
   end function fastest_disk
 
-  !> Whether moving sides compress the disks beyond close packing, so that their energy grows without limit; .false. if driving or
-  !> thermal walls supply energy.
+  !> True if moving sides compress the disks beyond close packing, so that their energy grows
+  !> without limit; .false. if driving or thermal walls supply energy.
   pure function are_crushed(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -221,7 +232,7 @@ contains
     end associate
   end function are_crushed
 
-  !> Whether time has stopped advancing during a long series of events, as in an inelastic collapse.
+  !> True if time has stopped advancing during a long series of events, as in an inelastic collapse.
   pure function stands_still(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -230,18 +241,19 @@ contains
       .and. sim%tally%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
   end function stands_still
 
-  !> Whether all disks under gravity are at rest at the end of an epoch; testing only there makes the result independent of the
-  !> caller's pauses. The whole epoch must consist of unresolved bounces, because a ball whose bounces still converge must execute
-  !> all of them. If the epoch has ended in such a state, that state is the last of the run.
+  !> True if all disks under gravity are at rest at the end of an epoch. The test is made only
+  !> there, so that the result does not depend on when the caller pauses. The whole epoch must
+  !> consist of unresolved bounces, because a ball whose bounces still converge must execute all of
+  !> them. If the epoch ends in such a state, this state is the last of the run.
   pure function has_come_to_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
-    real(real64) :: longest                        ! [time]
+    real(real64) :: longest                        ! duration of the longest bounce [time]
     integer(int32) :: i
 
     yes = sim%box%has_gravity() .and. sim%tally%events > sim%epoch_events &
       .and. (sim%tally%events >= most_events(sim) .or. sim%now >= sim%epoch_end)
-    if (yes) yes = is_at_rest(sim)                 ! first, because it returns at the first moving disk
+    if (yes) yes = is_at_rest(sim)                 ! tested first, because it returns at the first moving disk
     if (.not. yes) return
     longest = 0
     do i = 1, sim%n_disks()
@@ -250,8 +262,9 @@ contains
     yes = sim%now - sim%epoch_begin <= real(sim%tally%events - sim%epoch_events, real64)*longest
   end function has_come_to_rest
 
-  !> Longest bounce of disk i that is negligible, or too low to be resolved: lower than an eighth of the spacing of the disk's
-  !> coordinates [time]
+  !> Maximum duration of a bounce of disk i that is negligible or too low to be resolved. A bounce
+  !> is too low if its height is less than an eighth of the spacing of the disk's coordinates
+  !> [time].
   pure function unresolved_bounce(sim, i) result(long)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
@@ -260,11 +273,12 @@ contains
     long = max(sim%negligible_time, sqrt(spacing(maxval(abs(sim%disk(i)%x)))/magnitude(sim%box%gravity)))
   end function unresolved_bounce
 
-  !> Whether all disks are at rest. A disk bouncing inelastically on a surface at rest makes infinitely many bounces in a finite
-  !> time, because their durations form a convergent series. Under gravity, a disk counts as at rest if its last bounce was less
-  !> than `negligible_time` ago and its remaining bounces would end within `negligible_time`. Bounces lower than an eighth of the
-  !> spacing of the coordinates also count as rest, because rounding errors can make them endless. Without gravity, a disk is at
-  !> rest if it does not move.
+  !> True if all disks are at rest. A disk that bounces inelastically on a surface at rest makes
+  !> infinitely many bounces in a finite time, because their durations form a convergent series.
+  !> Under gravity a disk is therefore considered at rest if its last bounce was less than
+  !> `negligible_time` ago and its remaining bounces would end within `negligible_time`. Bounces
+  !> lower than an eighth of the spacing of the coordinates also count as rest, because rounding
+  !> errors can make them endless. Without gravity a disk is at rest if it does not move.
   pure function is_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -285,15 +299,16 @@ contains
     end do
   end function is_at_rest
 
-  !> The disk with the lowest id that rests on a side while other disks move; 0 if there is none. Its last event and its next bounce
-  !> on a dissipative side are both within `negligible_time` of the present. Its bounces are lower than the spacing of its
-  !> coordinates; therefore they converge, and time stops advancing.
+  !> The disk of lowest id that rests on a side while other disks move; 0 if there is none. Its last
+  !> event and its next bounce on a dissipative side are both within `negligible_time` of the
+  !> present time. Its bounces are lower than the spacing of its coordinates; they therefore
+  !> converge, and time stops advancing.
   pure function disk_on_side(sim) result(found)
     type(simulation_t), intent(in) :: sim
     integer(int32) :: found, i
 
     found = 0
-    if (sim%law%contact_time > 0) return             ! bounces then become elastic, and do not converge
+    if (sim%law%contact_time > 0) return             ! bounces then become elastic and do not converge
     do i = 1, sim%n_disks()
       if (.not. rests(i)) cycle
       if (found > 0) then
@@ -303,7 +318,7 @@ contains
     end do
   contains
 
-    !> Whether disk i rests on a side, at least for the moment.
+    !> True if disk i rests on a side, at least for the moment.
     pure function rests(i) result(yes)
       integer(int32), intent(in) :: i
       logical :: yes

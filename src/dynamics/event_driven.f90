@@ -1,8 +1,10 @@
-!> Event-driven dynamics: exact trajectories from event to event. Each disk stores the earliest of its predicted events. When this
-!> event is due, the disks involved collide, and their next events are predicted.
+!> Event-driven dynamics: exact trajectories from event to event. Each disk stores the earliest of
+!> its predicted events. When this event is due, the disks involved collide, and their next events
+!> are predicted.
 !>
-!> The event of a disk becomes stale if its partner collides with a third disk first. Stale events are not searched for: when such
-!> an event is due, the changed collision counter of the partner reveals it, and the next event of the disk is predicted instead.
+!> The event of a disk becomes stale if its partner collides with a third disk first. Stale events
+!> are not searched for. When a stale event is due, it is recognised by the changed collision
+!> counter of the partner, and the next event of the disk is predicted instead.
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time
@@ -25,27 +27,29 @@ module event_driven
   private
   public :: event_driven_t
 
-  !> Largest number of events between two checks of the limits.
+  !> Maximum number of events between two checks of the limits.
   integer(int64), parameter :: events_to_look = 20000
-  !> Largest number of disks that fit into a second-level cache, up to which prefetching saves no time.
+  !> ^number of disks that fit into a second-level cache; with fewer disks, prefetching saves no
+  !> time
   integer(int32), parameter :: disks_in_cache = 20000
   integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 
-  !> Which disk-disk collisions need the general procedure: those of disks with equal clocks, those of disks that have hardly moved
-  !> relative to each other, or all.
+  !> Disk-disk collisions that need the general procedure: those of disks with equal clocks, those
+  !> of disks that have hardly moved relative to each other, or all.
   integer, parameter :: if_clocks_are_equal = 0, if_hardly_moved = 1, always = 2
 
   type, extends(evolution_t) :: event_driven_t
-    !> The search for disks that can collide; polymorphic, so that the compiler does not inline
-    !> rarely used procedures into the hot path.
+    !> The search for collision partners; polymorphic, so that the compiler does not inline rarely
+    !> used procedures into the hot path.
     class(cell_grid_t), allocatable :: search
     type(event_queue_t) :: queue
-    logical :: windowed = .true.                   !! whether the queue uses the calendar in addition to the heap
-    integer :: general = if_clocks_are_equal       !! which collisions need the general procedure `collide`
-    logical :: lossy = .false.                     !! whether collisions can be part of an inelastic collapse
-    logical :: has_departed = .false.              !! whether a disk has left the box since the start of `advance`
-    logical :: is_part = .false.  !! whether this engine advances a single domain of a parallel run
-    class(histories_t), allocatable :: histories   !! records of the motion of disks in the domain
+    logical :: windowed = .true.      !! whether the queue uses the calendar in addition to the heap
+    integer :: general = if_clocks_are_equal       !! collisions that need the general procedure `collide`
+    logical :: lossy = .false.                     !! whether collisions may be part of an inelastic collapse
+    !> Whether a disk has left the box since the start of `advance`.
+    logical :: has_departed = .false.
+    logical :: is_part = .false.  !! whether this engine advances one domain of a parallel run
+    class(histories_t), allocatable :: histories   !! motion of the disks in the domain
     integer(int64) :: last_count = 0               !! total number of events at which `run_events` returns
   contains
     procedure :: start
@@ -57,8 +61,8 @@ module event_driven
 
 contains
 
-  !> Sets up the search and the event queue for the state `sim`: the initial state, that of a checkpoint, or that at the start of an
-  !> epoch.
+  !> Sets up the search and the event queue for the state `sim`: the initial state, the state of a
+  !> checkpoint, or the state at the start of an epoch.
   subroutine start(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -77,7 +81,8 @@ contains
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
   end subroutine start
 
-  !> Predicts the events of changed disks anew. Events of other disks with a changed disk as partner become stale.
+  !> Predicts the events of changed disks anew. Events of other disks with a changed disk as partner
+  !> become stale.
   subroutine renew(self, sim, changed)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -95,12 +100,13 @@ contains
     end do
   end subroutine renew
 
-  !> Predicts the events of all disks, whose clocks must be equal. If the next kick changes all velocities, later events will never
-  !> occur and are left out, except the earliest of all, because the queue must not be empty.
+  !> Predicts the events of all disks, whose clocks must be equal. If the next kick changes all
+  !> velocities, later events will never occur. They are left out of the queue, except the earliest
+  !> one, because the queue must not be empty.
   subroutine renew_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64) :: last                           ! latest time of an event that is entered into the queue [time]
+    real(real64) :: last                           ! latest time of an event in the queue [time]
     integer(int32) :: i, n
 
     n = sim%n_disks()
@@ -124,8 +130,8 @@ contains
     end do
   end subroutine renew_all
 
-  !> Executes events until a limit is reached. After a stop request the procedure returns early: some predictions may then be
-  !> missing, but the state of the simulation is complete.
+  !> Executes events until a limit is reached. After a stop request the procedure returns early;
+  !> some predictions may then be missing, but the state of the simulation is complete.
   subroutine advance(self, sim, limits, error, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -164,7 +170,8 @@ contains
         call follow_piston(self, sim)
         cycle
       end if
-      ! The returned event must not be stale: which stale events exist depends on the order of the predictions.
+      ! The returned event must not be stale, because the stale events depend on the order of the
+      ! predictions.
       if (is_stale()) then
         call predict(self, sim, event%disk)
         cycle
@@ -173,14 +180,15 @@ contains
         call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
         return
       end if
-      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! the periodic images of a sheared box never stop
+      ! the images of a sheared box never stop
+      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()
       if (limits%time < last_time) sim%now = max(sim%now, limits%time)
       self%arrived = .true.
       return
     end do
   contains
 
-    !> Whether the partner has collided since the event was predicted.
+    !> True if the partner has collided since the event was predicted.
     pure function is_stale() result(yes)
       logical :: yes
 
@@ -188,7 +196,7 @@ contains
       if (yes) yes = sim%disk(event%partner)%collision_counter /= sim%tag(event%disk)%partner_counter
     end function is_stale
 
-    !> Total number of executed events at which the limits are next checked.
+    !> Total number of events at which the limits are checked next.
     pure function next_pause() result(events)
       integer(int64) :: events
 
@@ -196,7 +204,7 @@ contains
       if (limits%watches() .or. present(log) .or. self%search%everyone) events = sim%tally%events + 1
     end function next_pause
 
-    !> Prefetches the data for the next events, and schedules the next prefetch.
+    !> Prefetches the data of the next events, and schedules the next prefetch.
     subroutine read_ahead()
       integer(int32) :: stage, n, disks(most_coming)
 
@@ -209,14 +217,15 @@ contains
     end subroutine read_ahead
   end subroutine advance
 
-  !> Hot path: executes one event after another until the number of events reaches `last_count`, the next event is beyond the time
-  !> limit, or all allowed iterations are used up. Rare operations are left to the caller.
+  !> Hot path: executes one event after another until the number of events reaches `last_count`, the
+  !> next event is beyond the time limit, or the allowed iterations are used up. Rare operations are
+  !> left to the caller.
   subroutine run_events(self, sim, t_limit, iterations, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: t_limit            !! time relative to the time origin `box%epoch` [time]
-    integer(int64), intent(inout) :: iterations    !! number of iterations left
-    type(event_t), intent(out) :: event            !! the last event; not executed if it is later than the time limit
+    real(real64), intent(in) :: t_limit            !! relative to the time origin `box%epoch` [time]
+    integer(int64), intent(inout) :: iterations    !! number of remaining iterations
+    type(event_t), intent(out) :: event     !! the last event; not executed if it is later than the time limit
     type(event_log_t), intent(inout), optional :: log
     real(real64) :: t
     integer(int32) :: i, code
@@ -239,19 +248,19 @@ contains
   subroutine execute(self, sim, i, code, t, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, code          !! index of the disk, and code of its partner: see `partners`
+    integer(int32), intent(in) :: i, code      !! index of the disk and code of its partner; see `partners`
     real(real64), intent(in) :: t
     type(event_log_t), intent(inout), optional :: log
     logical :: counts, is_general
-    real(real64) :: s                              ! time since the later of the previous events of both disks [time]
+    real(real64) :: s      ! time since the later of the previous events of both disks [time]
 
     counts = .true.
     if (self%is_part) counts = self%histories%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%collision_counter == sim%tag(i)%partner_counter) then
         if (self%general == if_clocks_are_equal) then
-          ! The clocks of two disks are equal only if they are still in contact, or if both have collided at exactly the present
-          ! time.
+          ! The clocks of two disks are equal only if the disks are still in contact, or if both
+          ! have collided at exactly the present time.
           is_general = .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0
         else if (self%general == if_hardly_moved) then
           ! One component of the displacement suffices, because `watch` tests both.
@@ -295,7 +304,7 @@ contains
   subroutine let_out(self, sim, i, code, t, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, code          !! index of the disk, and code of the side: see `partners`
+    integer(int32), intent(in) :: i, code          !! index of the disk and code of the side; see `partners`
     real(real64), intent(in) :: t
     type(event_log_t), intent(inout), optional :: log
 
@@ -303,7 +312,7 @@ contains
     self%last_count = 0
     call depart(sim, i, code, t, log)
     if (sim%disk(i)%radius > self%search%patch%small) then
-      call self%start(sim)                         ! the lists of big disks are made anew
+      call self%start(sim)                         ! makes the lists of big disks anew
     else
       call self%search%take_out(sim%tag(i), i)
       self%search%n_listed = self%search%n_listed - 1
@@ -322,9 +331,10 @@ contains
     sim%disk(i)%partner = nothing
   end subroutine forget_events
 
-  !> Updates predicted events after a collision has changed the motion of a piston: those of disks whose next event was a collision
-  !> with the piston, and of disks that it now reaches before their next event. The event loop returns afterwards, because the
-  !> piston may leave its strip of cells (see `piston_strips`) earlier than expected.
+  !> Updates predicted events after a collision has changed the motion of a piston: the events of
+  !> disks that were to collide with the piston next, and of disks that it now reaches before their
+  !> next event. The event loop then returns, because the piston may leave its strip of cells (see
+  !> `piston_strips`) earlier than expected.
   subroutine follow_side(self, sim, side)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -342,8 +352,8 @@ contains
     end associate
   end subroutine follow_side
 
-  !> When a piston leaves its strip (the cells within its reach, see `piston_strips`), predicts the events of the disks in the old
-  !> and the new strip anew.
+  !> When a piston leaves its strip (the cells within its reach, see `piston_strips`), predicts the
+  !> events of the disks in the old and the new strip anew.
   subroutine follow_piston(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -356,7 +366,7 @@ contains
     end do
   end subroutine follow_piston
 
-  !> Predicts the next event of disk i and enters this event into the queue.
+  !> Predicts the next event of disk i and enters it into the queue.
   subroutine predict(self, sim, i)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -366,7 +376,8 @@ contains
     call self%queue%schedule(sim%disk, sim%tag, i)
   end subroutine predict
 
-  !> Predicts the events of all disks after each event, not only of those involved: the simplest textbook algorithm.
+  !> Predicts the events of all disks after each event, and not only of those involved: the simplest
+  !> textbook algorithm.
   subroutine predict_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -1,5 +1,5 @@
-!> A priority queue of events: a min-heap in an array, with four children per node. It holds at most
-!> one event per disk, found by the index of the disk. The order of simultaneous events depends
+!> A priority queue of events: a min-heap in an array, with four children per node. It contains at
+!> most one event per disk, found by the index of the disk. The order of simultaneous events depends
 !> neither on the order of insertion nor on which of the two disks stores an event.
 module event_heap
   use kinds, only: int32
@@ -9,15 +9,14 @@ module event_heap
   private
   public :: event_heap_t, need_order, precedes
 
-  !> Number of children of a node. Compared with a binary heap, a heap with four children has half
-  !> as many levels, without needing more cache lines per level.
+  !> Number of children of a node. A heap with four children has half as many levels as a binary
+  !> heap, without needing more cache lines per level.
   integer(int32), parameter :: arity = 4
 
   type :: event_heap_t
     integer(int32) :: n = 0                      !! number of events
-    type(event_t), allocatable, private :: entry(:)        !! (n) events in heap order
-    !> (disks) position in `entry` of the event of each disk; 0 if the heap contains no event of the
-    !> disk
+    type(event_t), allocatable, private :: entry(:)        !! events in heap order
+    !> Position in `entry` of the event of each disk; 0 if the heap contains no event of the disk.
     integer(int32), allocatable, private :: slot(:)
   contains
     procedure :: initialise
@@ -28,7 +27,7 @@ module event_heap
 
 contains
 
-  !> Whether event a precedes event b: events are ordered by time, and simultaneous events by
+  !> True if event a precedes event b. Events are ordered by time; simultaneous events by
   !> `neighbour_search: wins`. If both disks of a pair have stored their collision, the two events
   !> have the same rank.
   pure function precedes(a, b, tag) result(yes)
@@ -40,9 +39,9 @@ contains
     if (.not. (yes .or. a%time > b%time)) yes = wins(a, b, tag)
   end function precedes
 
-  !> Nonzero if `precedes` has to order the simultaneous events a and b; a must not be earlier than
-  !> b. Usually they are the two copies of one collision, stored by both disks, whose order does not
-  !> matter.
+  !> Nonzero if the simultaneous events a and b must be ordered by `precedes`; a must not be earlier
+  !> than b. Usually they are the two copies of one collision, stored by both disks, whose order
+  !> does not matter.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits

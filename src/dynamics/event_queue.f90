@@ -1,9 +1,11 @@
-!> The event queue: a calendar combined with a heap (Paul, Journal of Computational Physics 221, 615 (2007)).
+!> The event queue: a calendar combined with a heap (Paul, Journal of Computational Physics 221, 615
+!> (2007)).
 !>
-!> Events of the current time window are kept in a short sorted list. If it overflows, they move to the heap, which is then used
-!> until the end of the window. Events of later windows are stored in the calendar, or in the heap if their bucket is full. Entries
-!> in the calendar are never searched for or removed individually; an entry is valid as long as it equals the event stored by its
-!> disk. Without the calendar, all events are in the heap.
+!> Events of the current time window are kept in a short sorted list. If the list overflows, its
+!> events move to the heap, which is then used until the end of the window. Events of later windows
+!> are stored in the calendar, or in the heap if their bucket is full. Calendar entries are never
+!> searched for or removed individually; an entry is valid as long as it equals the event stored by
+!> its disk. Without the calendar, all events are in the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none
@@ -22,19 +24,23 @@ module event_queue
     private
     type(calendar_t) :: calendar
     type(event_heap_t) :: heap
-    !> (0:n_near) sorted list of events, the latest first; element 0 is a sentinel that is never due
+    !> Sorted list of events, the latest first; element 0 is a sentinel that is never due; indices
+    !> 0:n_near.
     type(event_t) :: near(0:near_capacity)
     integer(int32) :: n_near = 0
-    !> .true. if new events of the current window go to the sorted list, .false. if they go to the heap
+    !> .true. if new events of the current window are added to the sorted list, .false. if they are
+    !> added to the heap.
     logical :: near_is_open = .false.
     logical :: windowed = .true.                   !! whether the calendar is used in addition to the heap
-    integer(int32) :: window = 0                   !! index of the current window, counted from the time origin `box%epoch`
+    !> Index of the current window, counted from the time origin `box%epoch`.
+    integer(int32) :: window = 0
     integer(int32) :: n_disks = 0
     real(real64) :: width = never                  !! width of a window [time]
     real(real64) :: per_time = 0.0_real64          !! number of windows per unit of time, 1/width [1/time]
     real(real64) :: next_window = 1.0_real64       !! window + 1
-    integer(int64) :: n_taken = 0                  !! number of events removed from the queue since the last call of `fill`
-    real(real64) :: filled_at = 0.0_real64         !! time of the last call of `fill` [time]
+    !> Number of events removed from the queue since the last `fill`.
+    integer(int64) :: n_taken = 0
+    real(real64) :: filled_at = 0.0_real64         !! time of the last `fill` [time]
   contains
     procedure :: fill
     procedure :: schedule
@@ -43,7 +49,8 @@ module event_queue
     procedure :: drop_first
     procedure :: drop_if_next
     procedure :: list_coming
-    ! Rarely called procedures are type-bound, which prevents the compiler from inlining them into frequently called ones.
+    ! Rarely called procedures are type-bound, so that the compiler does not inline them into
+    ! frequently called ones.
     procedure, private :: insert_near
     procedure, private :: insert_into_heap
     procedure, private :: first_in_heap
@@ -59,8 +66,8 @@ contains
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(inout) :: tag(:)
-    real(real64), intent(in) :: now                !! time relative to the time origin `box%epoch` [time]
-    logical, intent(in) :: windowed                !! whether the calendar is used; without the calendar all events are in the heap
+    real(real64), intent(in) :: now                !! relative to the time origin `box%epoch` [time]
+    logical, intent(in) :: windowed      !! whether the calendar is used; otherwise all events are in the heap
     integer(int32) :: i
 
     self%n_disks = size(disk, kind=int32)
@@ -68,13 +75,13 @@ contains
     self%near(0)%time = huge(now)
     call self%heap%initialise(self%n_disks)
     tag%window = window_none
-    ! The width of a window has a lower bound, so that window numbers fit into 32-bit integers.
+    ! The width of a window has a lower bound, so that window numbers fit into 32 bits.
     self%width = max(window_width(), 1.0e-9_real64*now, 1/never)
     self%windowed = windowed .and. self%width < never
     self%near_is_open = self%windowed
     self%n_taken = 0
     self%filled_at = now
-    self%per_time = 0                              ! without the calendar: a single window of infinite length
+    self%per_time = 0                              ! without the calendar: a single, infinitely long window
     if (self%windowed) then
       self%per_time = 1/self%width
       call self%calendar%empty(self%n_disks)
@@ -87,8 +94,9 @@ contains
     end do
   contains
 
-    !> Width of a window with `events_per_window` events on average, from the event rate since the last call of `fill`; at first,
-    !> from the median waiting time in a sample of disks. Without events the width is `never`.
+    !> Width of a window with `events_per_window` events on average, from the event rate since the
+    !> last `fill`; at first, from the median waiting time in a sample of disks. Without events the
+    !> width is `never`.
     pure function window_width() result(width)
       real(real64) :: width, waits(sample_size), swap
       integer :: i, k, n_waits
@@ -113,8 +121,8 @@ contains
     end function window_width
   end subroutine fill
 
-  !> Enters the event of disk i into the queue. A previous entry of the disk becomes invalid, because it no longer equals the stored
-  !> event.
+  !> Enters the event of disk i into the queue. A previous entry of the disk becomes invalid,
+  !> because it no longer equals the stored event.
   subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -125,7 +133,7 @@ contains
     logical :: full
 
     number = disk(i)%event_time*self%per_time
-    if (.not. number >= self%next_window) then     ! true for NaN too, so that the error is detected
+    if (.not. number >= self%next_window) then     ! also true for NaN, so that the error is detected
       tag(i)%window = window_none
       call self%insert_near(disk, tag, i)
       return
@@ -143,8 +151,8 @@ contains
     end if
   end subroutine schedule
 
-  !> Removes the entry of a disk from the queue by erasing the window number in its tag. The entry itself stays in memory, and
-  !> becomes invalid when the event of the disk changes.
+  !> Removes the entry of a disk from the queue by erasing the window number in its tag. The entry
+  !> stays in memory, and becomes invalid when the event of the disk changes.
   pure subroutine remove_entry(self, tag)
     class(event_queue_t), intent(in) :: self
     type(tag_t), intent(inout) :: tag
@@ -169,7 +177,7 @@ contains
     end if
   end subroutine insert_near
 
-  !> Moves the sorted list into the heap.
+  !> Moves the sorted list to the heap.
   subroutine hand_over(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -192,8 +200,9 @@ contains
     call self%heap%update(event_of(disk, i), tag)
   end subroutine insert_into_heap
 
-  !> Inserts an event into a sorted list of n events. Comparing the times is nearly always sufficient: simultaneous events are
-  !> usually the two copies of one collision, stored by both disks, whose order does not matter.
+  !> Inserts an event into a sorted list of n events. Comparing the times is nearly always
+  !> sufficient: simultaneous events are usually the two copies of one collision, stored by both
+  !> disks, whose order does not matter.
   pure subroutine insert(list, n, event, tag)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n
@@ -215,7 +224,7 @@ contains
     list(k + 1) = event
   end subroutine insert
 
-  !> Finds the disk with the earliest event. The event stays in the queue.
+  !> Finds the disk with the earliest event, which stays in the queue.
   subroutine first(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -236,7 +245,8 @@ contains
     end do
   end subroutine first
 
-  !> Disk with the earliest event in the heap; 0 if none is due in the current window.
+  !> Disk with the earliest event in the heap; 0 if no event in the heap is due in the current
+  !> window.
   subroutine first_in_heap(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -269,8 +279,9 @@ contains
     self%n_taken = self%n_taken + 1
   end subroutine drop_first
 
-  !> Removes the next entry of the queue if it belongs to disk i. If both disks of a collision have stored it, the two entries are
-  !> adjacent; removing the second one at once saves the time of recognising it as invalid later.
+  !> Removes the next entry of the queue if it belongs to disk i. If both disks of a collision have
+  !> stored it, the two entries are adjacent. Removing the second entry at once is faster than
+  !> recognising it as invalid later.
   subroutine drop_if_next(self, i)
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -284,13 +295,13 @@ contains
     type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(in) :: stage
     integer(int32), intent(out) :: n
-    integer(int32), intent(out) :: disks(most_coming)    !! (n) the disks
+    integer(int32), intent(out) :: disks(most_coming)    !! the n disks
 
     n = 0
     if (self%windowed) call self%calendar%list_coming(tag, self%window, stage, n, disks)
   end subroutine list_coming
 
-  !> Whether an entry is valid: equal to the event stored by its disk.
+  !> True if an entry is valid, that is, equal to the event stored by its disk.
   pure function is_valid(disk, event) result(yes)
     type(disk_t), intent(in) :: disk(*)
     type(event_t), intent(in) :: event
@@ -301,7 +312,8 @@ contains
     end associate
   end function is_valid
 
-  !> Advances by one window and sorts its events into the list, which must be empty.
+  !> Advances by one window and sorts the events of the new window into the list, which must be
+  !> empty.
   subroutine open_next_window(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -316,9 +328,10 @@ contains
     if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
-  !> Moves the valid events of a bucket to a sorted list; an entry is invalid if the event stored by its disk is due in a later
-  !> window. The position of each event in the list is the number of later events, counted without branches that depend on the
-  !> times, which is fast for the few events of a bucket.
+  !> Moves the valid events of a bucket to a sorted list. An entry is invalid if the event stored by
+  !> its disk is due in a later window. The position of an event in the list is the number of later
+  !> events. It is counted without branches that depend on the times, which is fast for the few
+  !> events of a bucket.
   pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)
@@ -358,8 +371,8 @@ contains
     end do
   end subroutine take_bucket
 
-  !> Moves the events that are due in the current window from the heap to the sorted list. If the
-  !> list overflows, all of its events are moved back.
+  !> Moves the events due in the current window from the heap to the sorted list. If the list
+  !> overflows, all its events are moved back.
   subroutine take_from_heap(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -375,8 +388,8 @@ contains
     call hand_over(self, disk, tag)
   end subroutine take_from_heap
 
-  !> Moves the events of the next span into their buckets. If windows have proved far too narrow or too wide, all events are entered
-  !> anew with another width.
+  !> Moves the events of the next span to their buckets. If the windows have proved far too narrow
+  !> or too wide, all events are entered anew with another width.
   subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -396,8 +409,8 @@ contains
     end do
   contains
 
-    !> Whether all events should be entered anew with another width of the windows: the present width has proved far too small or
-    !> too large, and enough windows have passed since the last call of `fill`.
+    !> True if all events should be entered anew with another window width: the present width has
+    !> proved far too small or too large, and enough windows have passed since the last `fill`.
     pure function ill_fitting() result(yes)
       logical :: yes
       real(real64) :: per_window

@@ -1,4 +1,4 @@
-!> Abstract type of all dynamics (event-driven, time-stepped, parallel), as seen by the timeline.
+!> Abstract type of all dynamics (event-driven, time-stepped, parallel), as used by the timeline.
 module evolution
   use kinds, only: int32, int64, never, real64
   use errors, only: error_t
@@ -9,20 +9,23 @@ module evolution
   private
   public :: evolution_t, limits_t
 
-  !> Limits at which the dynamics returns to its caller, whichever is reached first. The default values are never reached.
+  !> Limits at which the dynamics returns to its caller, whichever is reached first. The default
+  !> values are never reached.
   type :: limits_t
-    !> Limit of the simulated time, measured from the start of the run or, in the procedures of `evolution_t`, from the time origin
-    !> `box%epoch` [time]
+    !> Limit of the simulation time, measured from the start of the run or, in the procedures of
+    !> `evolution_t`, from the time origin `box%epoch` [time].
     real(real64) :: time = never
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! dissipated energy [energy]
-    logical :: at_rest = .false.                         !! whether the dynamics returns when all disks are at rest
-    integer(int64) :: disks_inside = -1                  !! number of disks in the box, after a departure; -1: no limit
-    !> Number of iterations of the event loop after which the dynamics returns, so that the caller can check signals and the wall
-    !> clock.
+    logical :: at_rest = .false.      !! whether the dynamics returns when all disks are at rest
+    !> Number of disks in the box after a departure; -1: no limit.
+    integer(int64) :: disks_inside = -1
+    !> Number of iterations of the event loop after which the dynamics returns, so that the caller
+    !> can check signals and the wall clock.
     integer(int64) :: iterations = huge(0_int64)
-    real(real64) :: sampled = 0.0_real64                 !! time of the latest sample, before which the run does not end
+    !> Time of the latest sample; the run does not end earlier [time].
+    real(real64) :: sampled = 0.0_real64
   contains
     procedure :: reached
     procedure :: outgrown
@@ -31,10 +34,13 @@ module evolution
 
   type, abstract :: evolution_t
     logical :: idle = .false.     !! whether no event will ever occur again
-    logical :: arrived = .false.  !! whether `advance` has reached its time limit and executed all events up to then
-    integer(int64) :: iterations_left = 0  !! number of allowed iterations that the last call of `advance` did not use
-    integer(int64) :: serial_events = 0    !! number of events executed by the serial engine of a parallel run
-    !> Disk and partner of the last executed event or, at the time limit, of the first event after it.
+    !> Whether `advance` has executed all events up to its time limit.
+    logical :: arrived = .false.
+    !> Allowed iterations not used by the last call of `advance`.
+    integer(int64) :: iterations_left = 0
+    integer(int64) :: serial_events = 0    !! events executed by the serial engine of a parallel run
+    !> Disk and partner of the last executed event or, at the time limit, of the first event after
+    !> the limit.
     integer(int32) :: last_event(2) = 0
   contains
     procedure :: warning
@@ -45,30 +51,31 @@ module evolution
   end type evolution_t
 
   abstract interface
-    !> Prepares the dynamics to continue from the state `sim`, either the initial state or that of a checkpoint. From it, all data
-    !> of the dynamics that are not part of the state are derived.
+    !> Prepares the dynamics for continuing from the state `sim`, the initial state or that of a
+    !> checkpoint. All data of the dynamics that are not part of the state are derived from it.
     subroutine start_evolution(self, sim)
       import :: evolution_t, simulation_t
       class(evolution_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: sim
     end subroutine start_evolution
 
-    !> Advances the simulation until a limit is reached or the log is full. The trajectory does not depend on when the procedure
-    !> returns.
+    !> Advances the simulation until a limit is reached or the log is full. The trajectory does not
+    !> depend on when the procedure returns.
     subroutine advance_evolution(self, sim, limits, error, log)
       import :: error_t, event_log_t, evolution_t, limits_t, simulation_t
       class(evolution_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: sim
       type(limits_t), intent(in) :: limits
       type(error_t), allocatable, intent(out) :: error
-      type(event_log_t), intent(inout), optional :: log    !! log of the collisions; without it collisions are not logged
+      !> Log of the collisions; without it, collisions are not logged.
+      type(event_log_t), intent(inout), optional :: log
     end subroutine advance_evolution
   end interface
 
 contains
 
-  !> Whether a limit other than the time limit is reached. The time limit is not tested, because events at exactly that time are
-  !> still executed.
+  !> True if a limit other than the time limit is reached. The time limit is not tested, because
+  !> events at exactly this time are still executed.
   pure function reached(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -78,9 +85,10 @@ contains
     if (self%disks_inside >= 0) yes = yes .or. tally%has_at_most(self%disks_inside)
   end function reached
 
-  !> Whether a quantity that can change in any collision, such as the dissipated energy, has reached its limit. Such a quantity must
-  !> never decrease during a run: a parallel run, advancing by time windows, detects only at the end of a window that a limit has
-  !> been exceeded, and then repeats the window to find the collision at which it was reached.
+  !> True if a quantity that can change in any collision, such as the dissipated energy, has reached
+  !> its limit. Such a quantity must never decrease during a run: a parallel run detects an exceeded
+  !> limit only at the end of a time window, and then repeats the window to find the collision at
+  !> which the limit was reached.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -89,7 +97,8 @@ contains
     yes = tally%total(dissipated) >= self%dissipated
   end function outgrown
 
-  !> Whether the run limits a quantity that can change in any collision, such as the dissipated energy.
+  !> True if the run limits a quantity that can change in any collision, such as the dissipated
+  !> energy.
   pure function watches(self) result(yes)
     class(limits_t), intent(in) :: self
     logical :: yes
@@ -97,7 +106,8 @@ contains
     yes = self%dissipated < huge(self%dissipated)
   end function watches
 
-  !> Warning about settings that are valid but rarely sensible with this dynamics; empty if there are none.
+  !> Warning about settings that are valid but rarely sensible with this dynamics; empty if there
+  !> are none.
   pure function warning(self, sim) result(text)
     class(evolution_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -106,17 +116,18 @@ contains
     text = ""
   end function warning
 
-  !> Earliest time, not before `time`, at which the dynamics can pause for an action on all disks. Time-stepped dynamics pauses only
-  !> between steps.
+  !> Earliest time, not before `time`, at which the dynamics can pause for an action on all disks.
+  !> Time-stepped dynamics pauses only between steps.
   pure function pause_at(self, time) result(t)
     class(evolution_t), intent(in) :: self
-    real(real64), intent(in) :: time              !! time since the start of the run
-    real(real64) :: t                             !! time since the start of the run
+    real(real64), intent(in) :: time              !! since the start of the run [time]
+    real(real64) :: t                             !! since the start of the run [time]
 
     t = time
   end function pause_at
 
-  !> Prepares the dynamics to continue after the caller has changed the state of some disks at the present time.
+  !> Prepares the dynamics for continuing after the caller has changed the state of some disks at
+  !> the present time.
   subroutine renew(self, sim, changed)
     class(evolution_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

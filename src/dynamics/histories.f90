@@ -1,6 +1,6 @@
 !> Records the motion of the disks in one domain during the present time window of a parallel run.
 !> The history of a disk consists of the range of cells that it visited and a digest (hash) of its
-!> collisions. After the window, histories show whether each ghost has moved in the same way as its
+!> collisions. After the window, histories show whether each ghost moved in the same way as its
 !> original in the domain that owns it. The module also determines which domain counts a collision.
 module histories
   use, intrinsic :: iso_fortran_env, only: int8
@@ -12,29 +12,32 @@ module histories
   private
   public :: history_t, histories_t
 
-  !> History of a disk in the present window. A disk owned by the domain needs none if it cannot be
-  !> a ghost in another domain.
+  !> History of a disk in the present window. A disk owned by the domain needs no history if it
+  !> cannot be a ghost in another domain.
   type :: history_t
-    integer(int64) :: digest = 0                   !! digest of the times of the collisions of this disk with other disks
+    integer(int64) :: digest = 0      !! digest of the times of the disk-disk collisions of this disk
     integer(int32) :: slot = 0
-    logical :: own = .false.                       !! whether this domain owns the disk; .false. for a ghost
-    integer(int16) :: low(2) = 0_int16             !! lowest column and lowest row in which the disk was
-    integer(int16) :: high(2) = 0_int16            !! highest column and highest row in which the disk was
+    logical :: own = .false.                       !! .true. if this domain owns the disk, .false. for a ghost
+    integer(int16) :: low(2) = 0_int16             !! first column and row visited by the disk
+    integer(int16) :: high(2) = 0_int16            !! last column and row visited by the disk
   end type history_t
 
   type :: histories_t
     type(patch_t) :: patch                         !! cells of the domain and its halo
     integer(int32) :: n_histories = 0
-    type(history_t), allocatable :: history(:)     !! (at least n_histories) histories of disks
-    integer(int32), allocatable :: history_of(:)   !! (slots) index of the history of each disk; 0 for a disk without a history
+    type(history_t), allocatable :: history(:)     !! histories of disks; size at least n_histories
+    !> Index of the history of the disk in each slot; 0 without a history.
+    integer(int32), allocatable :: history_of(:)
     integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! first and last column and row of the domain
-    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! columns and rows that belong to no other extended domain
+    !> Columns and rows that belong to no other extended domain.
+    integer(int32) :: deep_low(2) = 0, deep_high(2) = 0
     !> Range of columns and rows of the cells whose eight neighbours are all in the extended domain.
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0
-    !> (0:,0:) 1 for each cell outside the domain that a disk of the domain has reached, and for the
-    !> eight neighbours of such a cell; 0 elsewhere
+    !> 1 for each cell outside the domain that an owned disk has reached, and for its eight
+    !> neighbours; 0 elsewhere; indices from 0.
     integer(int8), allocatable :: reached(:, :)
-    logical :: left_patch = .false.                !! whether an owned disk has reached the edge of the extended domain
+    !> Whether an owned disk has reached the edge of the extended domain.
+    logical :: left_patch = .false.
   contains
     procedure :: record_collision
     procedure :: record_cell
@@ -52,7 +55,7 @@ module histories
 
 contains
 
-  !> Starts a new window, at the start of which no owned disk has left the domain.
+  !> Starts a new window. At its start, no owned disk has left the domain.
   subroutine begin_window(self)
     class(histories_t), intent(inout) :: self
 
@@ -60,8 +63,8 @@ contains
     self%left_patch = .false.
   end subroutine begin_window
 
-  !> Starts a new history of disk i if the disk can be a ghost in another domain while it is in its
-  !> present cell. The domain owns the disk if this cell is in the domain.
+  !> Starts a new history of disk i if the disk, in its present cell, can be a ghost in another
+  !> domain. The domain owns the disk if this cell is in the domain.
   subroutine begin_history(self, cell, i)
     class(histories_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
@@ -75,7 +78,7 @@ contains
     end if
   end subroutine begin_history
 
-  !> Assigns a history to disk i, whose content the caller sets.
+  !> Assigns an empty history to disk i; the caller sets its contents.
   subroutine add_history(self, i)
     class(histories_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -85,7 +88,7 @@ contains
     self%history_of(i) = self%n_histories
   end subroutine add_history
 
-  !> Deletes the history of disk i, if it has one, by moving the last history in the array to its
+  !> Deletes the history of disk i, if there is one, by moving the last history in the array to its
   !> place.
   subroutine drop_history(self, i)
     class(histories_t), intent(inout) :: self
@@ -102,8 +105,8 @@ contains
     self%n_histories = self%n_histories - 1
   end subroutine drop_history
 
-  !> Whether this domain counts a collision of disk i. Collisions of two disks are counted by the
-  !> owner of the disk with the lower id, all other collisions by the owner of disk i.
+  !> True if this domain counts a collision of disk i. A disk-disk collision is counted by the owner
+  !> of the disk with the lower id, any other collision by the owner of disk i.
   pure function counts(self, tag, i, code) result(yes)
     class(histories_t), intent(in) :: self
     type(tag_t), intent(in) :: tag(:)
@@ -118,7 +121,7 @@ contains
     end if
   end function counts
 
-  !> Records a collision of disks i and j, and the cells that contain the two disks.
+  !> Records a collision of disks i and j, and the cells of both disks.
   subroutine record_collision(self, disk, tag, i, j)
     class(histories_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -131,7 +134,7 @@ contains
     call self%record_cell(tag(j)%cell, j)
   end subroutine record_collision
 
-  !> Adds the time of a collision to a digest of collision times.
+  !> Adds the time of a collision to a digest.
   elemental subroutine add_moment(digest, time)
     integer(int64), intent(inout) :: digest
     real(real64), intent(in) :: time
@@ -139,7 +142,7 @@ contains
     digest = ieor(ishftc(digest, 11), transfer(time, digest))
   end subroutine add_moment
 
-  !> Prefetches the history indices of some disks and of their partners.
+  !> Prefetches the history indices of several disks and of their partners.
   subroutine read_ahead(self, disk, disks)
     class(histories_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -226,7 +229,7 @@ contains
     n = count(.not. self%history(:self%n_histories)%own, kind=int32)
   end function n_ghosts
 
-  !> Whether a disk that was in the given range of columns and rows during the window could have
+  !> True if a disk that was in the given range of columns and rows during the window could have
   !> touched an owned disk.
   pure function could_have_met(self, low, high) result(yes)
     class(histories_t), intent(in) :: self

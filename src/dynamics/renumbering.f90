@@ -1,4 +1,4 @@
-!> Sorts the disks in memory such that neighbours in space become neighbours in memory.
+!> Sorts the disks in memory, so that neighbours in space become neighbours in memory.
 module renumbering
   use kinds, only: int32, real64
   use disks, only: whole_disk_t
@@ -9,14 +9,15 @@ module renumbering
   private
   public :: renumber
 
-  integer(int32), parameter :: tile = 8  !! number of cells along the edge of a tile, whose disks fill a memory page
+  !> Number of cells along the edge of a tile; the disks of a tile fill a memory page.
+  integer(int32), parameter :: tile = 8
 
 contains
 
   !> Sorts the disks by the cells of a grid with about one disk per cell, and the cells by square
   !> tiles, so that the disks in a region of space occupy few memory pages. Disks in the same cell
-  !> keep their order. The new order depends on the state alone, not on the search or the queue. The
-  !> ids of disks (`tag%id`) do not change.
+  !> keep their order. The new order depends only on the state, and not on the search or the queue.
+  !> The ids of the disks (`tag%id`) do not change.
   subroutine renumber(sim)
     type(simulation_t), intent(inout) :: sim
     type(grid_t) :: cells
@@ -41,8 +42,8 @@ contains
   !> close to their new position in memory.
   subroutine move_in_order(sim, order)
     type(simulation_t), intent(inout) :: sim
-    !> on entry, index of the disk that belongs at each position; on return, the identity
-    !> permutation
+    !> On entry, the index of the disk that belongs at each position; on return, the identity
+    !> permutation.
     integer(int32), intent(inout) :: order(:)
     type(whole_disk_t) :: held
     integer(int32) :: start, to, from

@@ -1,8 +1,11 @@
-!> Determines when a run ends: when a stop rule of the input is met, or when rounding errors dominate the velocities of the disks.
+!> Determines when a run ends: a stop rule of the input is met, or rounding errors dominate the
+!> velocities of the disks.
 !>
-!> Inelastic disks in a periodic box would cool for ever. Such a run ends when rounding errors dominate the temperature; testing
-!> this at the start of epochs makes the end of the run depend on the trajectory alone. The present kinetic energy is compared with
-!> that at the time when the velocities were last set, which determines the magnitude of the rounding errors.
+!> Inelastic disks in a periodic box would cool for ever. Such a run ends when rounding errors
+!> dominate the temperature. The test is made at the start of epochs, so that the end of the run
+!> depends only on the trajectory. The present kinetic energy is compared with the kinetic energy at
+!> the time when the velocities were last set, which determines the magnitude of the rounding
+!> errors.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use entries, only: awaits_entry
@@ -15,7 +18,8 @@ module stop_rules
   private
   public :: coldness, stop_rule_t, stop_settings_t, whole_collisions
 
-  real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature at which a run ends, divided by the initial temperature
+  !> Temperature at which a run ends, relative to the initial temperature.
+  real(real64), parameter :: coldest = 1.0e-25_real64
   character(len=*), parameter :: coldness = "cooled to 1e-25 of the initial temperature"
 
   !> The values of the stop rules in the input. The default values are never reached.
@@ -26,7 +30,8 @@ module stop_rules
     integer(int64) :: events = huge(0_int64)
     real(real64) :: energy_fraction = 0.0_real64
     logical :: at_rest = .false.                      !! whether the run ends when all disks are at rest
-    integer(int64) :: disks_inside = -1               !! number of disks in the box at which a departure ends the run; -1: no limit
+    !> Number of disks in the box at which a departure ends the run; -1: no limit.
+    integer(int64) :: disks_inside = -1
     real(real64) :: wall_clock = never                !! [s]
   end type stop_settings_t
 
@@ -47,7 +52,7 @@ module stop_rules
 
 contains
 
-  !> The stop rules of the input, converted to limits on quantities of the simulation.
+  !> The stop rules of the input as limits on quantities of the simulation.
   pure function new_stop_rule(settings, sim) result(rule)
     type(stop_settings_t), intent(in) :: settings
     type(simulation_t), intent(in) :: sim
@@ -63,8 +68,8 @@ contains
     if (settings%energy_fraction > 0) rule%limits%dissipated = (1 - settings%energy_fraction)*sim%start_energy
   end function new_stop_rule
 
-  !> A real number of collisions, rounded up to an integer, or down if it exceeds an integer only by rounding errors. The result is
-  !> huge(n) if the number exceeds the range of 64-bit integers.
+  !> A real number of collisions, rounded up to an integer, or down if it exceeds an integer only by
+  !> rounding errors. The result is huge(n) if the number exceeds the range of 64-bit integers.
   pure function whole_collisions(number) result(n)
     real(real64), intent(in) :: number
     integer(int64) :: n
@@ -73,7 +78,7 @@ contains
     if (number < 9.0e18_real64) n = ceiling(number - 4*spacing(number), int64)
   end function whole_collisions
 
-  !> Whether a stop rule other than the limit of wall-clock time is met.
+  !> True if a stop rule other than the wall-clock limit is met.
   pure function is_met(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -85,8 +90,9 @@ contains
     if (.not. yes) yes = stands_still(sim) .and. is_at_rest(sim)
   end function is_met
 
-  !> Whether the disks are at rest and the input contains the stop rule `at_rest`. Needed without gravity, where disks at rest have
-  !> no events: no epoch ends, and the test at the end of an epoch is never made.
+  !> True if the disks are at rest and the input contains the stop rule `at_rest`. This test is
+  !> needed without gravity, where disks at rest have no events: no epoch ends, and the test at the
+  !> end of an epoch is never made.
   pure function rests(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -96,8 +102,9 @@ contains
     if (yes) yes = is_at_rest(sim)
   end function rests
 
-  !> Whether, at the start of an epoch, rounding errors dominate the kinetic energy relative to the mean velocity, in a system that
-  !> would cool for ever: inelastic disks in a periodic box.
+  !> True if, at the start of an epoch, rounding errors dominate the kinetic energy relative to the
+  !> mean velocity. This occurs only in a system that would cool for ever: inelastic disks in a
+  !> periodic box.
   pure function too_cold(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -109,8 +116,9 @@ contains
       yes = relative_energy(sim) < coldest*sim%reference_energy
   end function too_cold
 
-  !> Whether a run is finished: a stop rule is met, rounding errors dominate the velocities, or no further event can occur in a run
-  !> without a time limit. Failures are reported by `timeline` and the evolution instead.
+  !> True if a run is finished: a stop rule is met, rounding errors dominate the velocities, or no
+  !> further event can occur in a run without a time limit. Failures are reported by `timeline` and
+  !> the evolution instead.
   pure function is_over(self, sim, evolution) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -122,8 +130,8 @@ contains
       yes = self%rests(sim) .or. .not. min(self%limits%time, next_action(evolution, sim)) < never
   end function is_over
 
-  !> Kinetic energy relative to the mean velocity. The mean velocity is computed in a separate pass over the disks, because a
-  !> difference of two large sums would lose precision.
+  !> Kinetic energy relative to the mean velocity. The mean velocity is computed in a separate pass
+  !> over the disks, because a difference of two large sums would lose precision.
   pure function relative_energy(sim) result(energy)
     type(simulation_t), intent(in) :: sim
     real(real64) :: energy                          !! [energy]
@@ -142,7 +150,8 @@ contains
     end do
   end function relative_energy
 
-  !> Completed fraction of the run, from 0 to 1: the largest ratio, among all stop rules, of present value to limit.
+  !> Completed fraction of the run, from 0 to 1: the maximum over all stop rules of the present
+  !> value divided by the limit.
   pure function share(self, sim, elapsed) result(done)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

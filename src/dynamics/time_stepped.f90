@@ -1,9 +1,10 @@
-!> Time-stepped dynamics. In each step of fixed length all disks first move in exact free flight; then each disk beyond a wall is
-!> reflected, and each overlapping, approaching pair collides once. A contact is detected up to one step late, and missed if it
-!> begins and ends within a step. The method exists for comparison with event-driven dynamics.
+!> Time-stepped dynamics. In each step of fixed length, all disks first move in exact free flight;
+!> then each disk beyond a wall is reflected, and each overlapping, approaching pair collides once.
+!> A contact is detected up to one step late, and missed if it begins and ends within a step. The
+!> method exists for comparison with event-driven dynamics.
 !>
-!> As in event-driven dynamics, the stored state of a disk changes only in its collisions, so that rounding errors do not accumulate
-!> from step to step.
+!> As in event-driven dynamics, the stored state of a disk changes only in its collisions, so that
+!> rounding errors do not accumulate from step to step.
 module time_stepped
   use images, only: images_t
   use kinds, only: int32, int64, largest_exact, never, real64
@@ -23,9 +24,10 @@ module time_stepped
   private
   public :: time_stepped_t
 
-  !> Largest recommended displacement in a step, relative to the smallest radius.
+  !> Maximum recommended displacement per step, relative to the smallest radius.
   real(real64), parameter :: longest_way = 0.5_real64
-  integer(int64), parameter :: steps_per_look = 1024  !! number of steps between two tests of whether any disk moves
+  !> Number of steps between two tests of whether any disk moves.
+  integer(int64), parameter :: steps_per_look = 1024
 
   type, extends(evolution_t) :: time_stepped_t
     real(real64) :: dt = 0.0_real64                 !! [time]
@@ -33,9 +35,9 @@ module time_stepped
     logical :: every_pair = .false.
     type(verlet_list_t), private :: near
     ! The coordinates are stored separately from the disks, so that loops can be vectorised.
-    real(real64), allocatable, private :: x(:, :)    !! (disks,2) positions in this step [length]
-    real(real64), allocatable, private :: radius(:)  !! (disks) [length]
-    integer(int32), allocatable, private :: outside(:)   !! (disks) 1 if the disk is beyond a side
+    real(real64), allocatable, private :: x(:, :)    !! positions in this step; shape (disks, 2) [length]
+    real(real64), allocatable, private :: radius(:)  !! radius of each disk [length]
+    integer(int32), allocatable, private :: outside(:)   !! 1 for each disk beyond a side, otherwise 0
   contains
     procedure :: warning
     procedure :: pause_at
@@ -63,8 +65,8 @@ contains
   !> End of the time step that contains a given time.
   pure function pause_at(self, time) result(t)
     class(time_stepped_t), intent(in) :: self
-    real(real64), intent(in) :: time               !! time since the start of the run
-    real(real64) :: t                              !! time since the start of the run
+    real(real64), intent(in) :: time               !! since the start of the run [time]
+    real(real64) :: t                              !! since the start of the run [time]
 
     t = time
     if (time > largest_exact*self%dt) return
@@ -72,8 +74,8 @@ contains
     if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
   end function pause_at
 
-  !> Prepares the dynamics to continue after velocities have been changed. Only the test for rest is reset: Verlet lists do not
-  !> depend on velocities.
+  !> Prepares the dynamics for continuing after velocities have been changed. Only the test for rest
+  !> is reset; Verlet lists do not depend on velocities.
   subroutine renew(self, sim, changed)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -82,7 +84,7 @@ contains
     self%idle = .false.
   end subroutine renew
 
-  !> Executes steps, the k-th of which ends at the time k*dt, independently of when earlier calls of `advance` returned.
+  !> Executes steps. Step k ends at the time k*dt, whenever earlier calls of `advance` returned.
   subroutine advance(self, sim, limits, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -123,7 +125,7 @@ contains
     end do
   end function steps_taken
 
-  !> Whether all disks are at rest, with no force or side that could set them in motion.
+  !> True if all disks are at rest, and no force or side can set them in motion.
   pure function at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -136,10 +138,10 @@ contains
     end do
   end function at_rest
 
-  !> Advances all disks to the time t and executes all collisions that are due then. Collisions with sides precede those with
-  !> obstacles, and these precede collisions of two disks. Within each group the order is that of the disk indices, so the result
-  !> does not depend on the method of the search for pairs. If the program is asked to stop during a long search, the procedure
-  !> returns early and leaves the state unchanged.
+  !> Advances all disks to the time t and executes all collisions that are due: first with sides,
+  !> then with obstacles, then between disks. Within each group the order is that of the disk
+  !> indices, so the result does not depend on how pairs are searched for. If a stop is requested
+  !> during a long search, the procedure returns early and leaves the state unchanged.
   subroutine take_step(self, sim, t, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -186,7 +188,8 @@ contains
     end do
   contains
 
-    !> Moves disk i through the periodic sides that it has passed, reflects it at walls, and lets it leave through open sides.
+    !> Moves disk i through the periodic sides that it has passed, reflects it at walls, and lets it
+    !> leave through open sides.
     subroutine meet_sides()
       real(real64) :: beyond, inset, before(2), low(2), high(2)
       integer(int32) :: side
@@ -217,8 +220,8 @@ contains
       end do
     end subroutine meet_sides
 
-    !> Reflects disk i, which overlaps a wall (a side or an obstacle), if it is moving further into it. Position and potential
-    !> energy do not change.
+    !> Reflects disk i, which overlaps a wall (a side or an obstacle), if it is moving further into
+    !> it. Position and potential energy do not change.
     subroutine meet_wall(i, code)
       integer(int32), intent(in) :: i, code
       real(real64) :: normal(2)
@@ -228,7 +231,7 @@ contains
         call collide(sim, i, code, sim%now, .true., log)
     end subroutine meet_wall
 
-    !> Executes the collision of the overlapping disks i and j (i < j), if they approach each other.
+    !> Executes the collision of the overlapping disks i and j (i < j) if they approach each other.
     subroutine meet_disk(i, j)
       integer(int32), intent(in) :: i, j
       type(images_t) :: images
@@ -253,7 +256,8 @@ contains
     k = 0
   end function next_marked
 
-  !> Sets `outside` to 1 for disks that are not between the sides or have a NaN position, and to 0 for all others.
+  !> Sets `outside` to 1 for disks that are not between the sides or have a NaN position, and to 0
+  !> for all others.
   pure subroutine mark_outside(self, sim)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -271,7 +275,7 @@ contains
     end associate
   end subroutine mark_outside
 
-  !> 1 if x is between two limits; 0 if x is outside of the limits or NaN.
+  !> 1 if x is between two limits; 0 if x is outside the limits or NaN.
   elemental function between(x, low, high) result(inside)
     real(real64), intent(in) :: x, low, high
     integer(int32) :: inside
@@ -279,9 +283,10 @@ contains
     inside = iand(merge(1, 0, x >= low), merge(1, 0, x <= high))
   end function between
 
-  !> Warning about the length of the step; empty if it is suitable. The largest speed under gravity is estimated as v0 + sqrt(2 g
-  !> L), for the fastest disk falling through the whole box of length L. Without the TC model, a disk under gravity that dissipates
-  !> energy in every step of a lasting contact sinks by up to g dt**2/2 per step.
+  !> Warning about the length of the step; empty if it is suitable. The maximum speed under gravity
+  !> is estimated as v0 + sqrt(2 g L), for the fastest disk falling through the whole box of length
+  !> L. Without the TC model, a disk under gravity that dissipates energy in every step of a lasting
+  !> contact sinks by up to g dt**2/2 per step.
   pure function warning(self, sim) result(text)
     class(time_stepped_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

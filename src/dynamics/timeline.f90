@@ -1,6 +1,7 @@
-!> Executes the actions that affect all disks at once, in a fixed order. At equal times, collisions come first, then scheduled
-!> changes, entries of disks, kicks, and finally the actions of the caller (samples, end of the run). The time origin moves at the
-!> end of an epoch, when no other action is in progress.
+!> Executes the actions that affect all disks at once, in a fixed order. At equal times, collisions
+!> come first, then scheduled changes, entries of disks, kicks, and finally the actions of the
+!> caller (samples, end of the run). The time origin moves at the end of an epoch, when no other
+!> action is in progress.
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal
@@ -21,7 +22,8 @@ module timeline
   private
   public :: adapted_iterations, advance, advance_once, next_action, collapse_note, report_rest
 
-  real(real64), parameter :: pause_interval = 0.05_real64  !! intended time between two checks of signals and of the wall clock [s]
+  !> Intended wall-clock time between two checks of signals and of the clock [s].
+  real(real64), parameter :: pause_interval = 0.05_real64
 
 contains
 
@@ -40,8 +42,9 @@ contains
     end do
   end subroutine advance
 
-  !> Advances the simulation until a limit is reached, a change, an entry or a kick is due, a disk leaves the box, or the epoch
-  !> ends. Then executes the due action, or starts the next epoch. The trajectory does not depend on when the procedure returns.
+  !> Advances the simulation until a limit is reached, a change, an entry or a kick is due, a disk
+  !> leaves the box, or the epoch ends. Then executes the due action or starts the next epoch. The
+  !> trajectory does not depend on when the procedure returns.
   subroutine advance_once(evolution, sim, limits, error, log)
     class(evolution_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -61,7 +64,8 @@ contains
     due = min(limits%time, next_action(evolution, sim))
     goal = limits
     until = due - sim%box%epoch
-    if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)   ! rounding up ensures that `due` is reached
+    ! rounding up ensures that `due` is reached
+    if (sim%box%epoch + until < due) until = nearest(until, 1.0_real64)
     goal%time = until
     by_event = .false.
     if (sim%epoch_end > 0) then                    ! time-stepped dynamics has no epochs
@@ -78,7 +82,7 @@ contains
         call wait()
       else if (arrived .and. until > sim%epoch_end) then
         epoch_is_over = .true.
-        arrived = .false.                          ! the evolution stopped at the end of the epoch, before the intended time
+        arrived = .false.                          ! stopped at the end of the epoch, before the intended time
       end if
       if (epoch_is_over) call end_epoch()
     end if
@@ -100,7 +104,7 @@ contains
 
     !> Continues after a change of the velocities of some disks and, if `moved`, of their positions.
     subroutine continue_with(disks, moved)
-      integer(int32), intent(in) :: disks(:)         !! indices of the disks
+      integer(int32), intent(in) :: disks(:)         !! indices of the changed disks
       logical, intent(in) :: moved
 
       if (ends_by_kick(sim, disks)) then
@@ -113,16 +117,18 @@ contains
       end if
     end subroutine continue_with
 
-    !> If no further event can occur, advances the time to the next action or, without one, to the last collision or sample.
+    !> If no further event can occur, advances the time to the next action or, without one, to the
+    !> last collision or sample.
     subroutine wait()
       if (due < last_time) then
         sim%now = max(sim%now, until)
-      else                                           ! a stale event, or the end of an epoch, may have advanced the time
+      else      ! a stale event or the end of an epoch may have advanced the time
         sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%box%epoch)
       end if
     end subroutine wait
 
-    !> Starts the next epoch, unless the disks are crushed or events no longer advance the time, which is reported.
+    !> Starts the next epoch, unless the disks are crushed or events no longer advance the time;
+    !> this is reported.
     subroutine end_epoch()
       if (are_crushed(sim)) then
         call fail(error, exit_broken, "side.end_time: the side crushes the disks, whose energy has grown a million times; " &
@@ -140,14 +146,14 @@ contains
   !> Reports that events no longer advance the time.
   subroutine fail_at_standstill(sim, last, error)
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: last(2)            !! index of a disk, and its partner: see `partners`
+    integer(int32), intent(in) :: last(2)            !! index of a disk, and its partner; see `partners`
     type(error_t), allocatable, intent(out) :: error
 
     call fail(error, exit_broken, standstill(sim, last(1), last(2)))
   end subroutine fail_at_standstill
 
-  !> When a run has reached its number of events or collisions, reports whether time would stop advancing with a later limit,
-  !> because all disks are at rest or one disk rests on a side.
+  !> When a run has reached its number of events or collisions, reports whether time would stop
+  !> advancing if the run continued, because all disks are at rest or one disk rests on a side.
   subroutine report_rest(evolution, sim, limits, error)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
@@ -167,13 +173,14 @@ contains
     if (last(1) > 0) call fail_at_standstill(sim, last, error)
   end subroutine report_rest
 
-  !> Number of iterations of the event loop that take about the wall-clock time `pause_interval`. It is increased only after a call
-  !> that used all its iterations. If calls that reach a limit early increased it too, it would grow without bound in a run with
-  !> many samples, and signals would go unchecked for hours after the last sample.
+  !> Number of iterations of the event loop that take about the wall-clock time `pause_interval`. It
+  !> is increased only after a call that used all its iterations. If calls that reach a limit early
+  !> increased it too, it would grow without bound in a run with many samples, and signals would
+  !> remain unchecked for hours after the last sample.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
-    real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations that were used [s]
-    logical, intent(in) :: cut_short                  !! whether a limit was reached before all iterations were used
+    real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations [s]
+    logical, intent(in) :: cut_short      !! whether a limit was reached before all iterations were used
     integer(int64) :: n
 
     n = iterations
@@ -182,7 +189,8 @@ contains
   end function adapted_iterations
 
   !> Makes the changes that are due. Further events can then occur at the present time, before any
-  !> other action. A kick at the present time follows the changes, unless it has already been applied.
+  !> other action. A kick at the present time follows the changes, unless it has already been
+  !> applied.
   subroutine make_changes(evolution, sim, changed, error)
     class(evolution_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -197,13 +205,14 @@ contains
       changed = .true.
     end do
     if (.not. changed) return
-    do while (has_kicked(evolution, sim) .and. .not. kicked)    ! `change_system` has counted the kicks up to the present time
+    ! `change_system` has counted the kicks up to the present time
+    do while (has_kicked(evolution, sim) .and. .not. kicked)
       sim%kicks = sim%kicks - 1
     end do
     call evolution%start(sim)
   end subroutine make_changes
 
-  !> Whether the last kick was at the present time.
+  !> True if the last kick was at the present time.
   pure function has_kicked(evolution, sim) result(yes)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
@@ -217,27 +226,28 @@ contains
   pure function next_action(evolution, sim) result(t)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
-    real(real64) :: t                              !! time since the start of the run; set to `never` if there are none
+    real(real64) :: t      !! time since the start of the run; `never` without such an action
 
     t = min(next_change(evolution, sim), next_entry(evolution, sim), next_kick(evolution, sim))
   end function next_action
 
-  !> Time of the next scheduled change, made after all collisions and before all other actions at the same time.
+  !> Time of the next scheduled change, made after all collisions and before all other actions at
+  !> the same time.
   pure function next_change(evolution, sim) result(t)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
-    real(real64) :: t                              !! time since the start of the run; set to `never` if there are none
+    real(real64) :: t      !! time since the start of the run; `never` without a change
 
     t = never
     if (.not. allocated(sim%schedule)) return
     if (sim%changes_made < size(sim%schedule)) t = evolution%pause_at(sim%schedule(sim%changes_made + 1)%time)
   end function next_change
 
-  !> Time of the next action of a source.
+  !> Time when a source acts next.
   pure function next_entry(evolution, sim) result(t)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
-    real(real64) :: t                              !! time since the start of the run; set to `never` if there is none
+    real(real64) :: t      !! time since the start of the run; `never` without a source
     integer :: s
 
     t = never
@@ -245,8 +255,9 @@ contains
     if (s > 0) t = evolution%pause_at(entry_time(sim, s))
   end function next_entry
 
-  !> Index of the source that acts next, at equal times the first in the file; 0 if no source acts any more. With time steps, all
-  !> sources due within a step act at its end, in the order of the file.
+  !> Index of the source that acts next; at equal times, the first in the file; 0 if no source will
+  !> act any more. With time steps, all sources due within a step act at its end, in the order of
+  !> the file.
   pure function next_source(evolution, sim) result(next)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
@@ -269,7 +280,7 @@ contains
   pure function next_kick(evolution, sim) result(t)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
-    real(real64) :: t                              !! time since the start of the run; set to `never` if there are no kicks
+    real(real64) :: t                              !! time since the start of the run; `never` without kicks
 
     t = evolution%pause_at(sim%kick_time(sim%kicks + 1))
     if (evolution%idle .and. allocated(sim%drive)) then
@@ -277,10 +288,11 @@ contains
     end if
   end function next_kick
 
-  !> Message on why events of disk i with its partner no longer advance the time, with a remedy.
+  !> Message that explains why events of disk i with its partner no longer advance the time, and
+  !> suggests a remedy.
   pure function standstill(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i, code            !! as in `partners`
+    integer(int32), intent(in) :: i, code      !! index of the disk and code of its partner; see `partners`
     character(len=:), allocatable :: text
     character(len=*), parameter :: steps = "or use run.dynamics = 'steps'"
     logical :: from_the_start
@@ -303,7 +315,7 @@ contains
     if (is_at_rest(sim)) text = text//"; stop.at_rest = .true. ends a run where all disks have come to rest"
   end function standstill
 
-  !> Whether an event of disk i with the given partner can dissipate energy.
+  !> True if an event of disk i with the given partner can dissipate energy.
   pure function may_lose(sim, i, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code
@@ -316,12 +328,13 @@ contains
     end if
   end function may_lose
 
-  !> Whether disk i slides along an obstacle that is concave towards the disk.
+  !> True if disk i slides along an obstacle that is concave towards the disk.
   pure function slides(sim, i, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code
     logical :: yes
-    real(real64), parameter :: grazing = 1.0e-6_real64     ! largest ratio of normal velocity to speed of a sliding disk
+    ! maximum ratio of normal velocity to speed for a sliding disk
+    real(real64), parameter :: grazing = 1.0e-6_real64
     real(real64) :: x(2), v(2), normal(2)
 
     yes = .false.
@@ -334,7 +347,7 @@ contains
     end associate
   end function slides
 
-  !> Report of the inelastic collapses in a run; empty if no collapse occurred.
+  !> Report about the inelastic collapses in a run; empty if no collapse occurred.
   pure function collapse_note(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
@@ -345,14 +358,15 @@ contains
       //"; the motion after it depends on rounding errors; "//longer_contacts(sim)
   end function collapse_note
 
-  !> Advice to set a contact duration much longer than the times in a collapse and much shorter than the mean time between
-  !> collisions, with a suitable value unless the present one is long enough.
+  !> Advice to set a contact duration much longer than the times in a collapse and much shorter than
+  !> the mean time between collisions. A suitable value is proposed unless the present one is long
+  !> enough.
   pure function longer_contacts(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
     real(real64), parameter :: share = 0.01_real64, negligible_times = 1.0e5_real64
     integer(int64) :: contacts                     ! number of collisions, summed over all disks
-    real(real64) :: proposal                       ! [time]
+    real(real64) :: proposal                       ! proposed contact duration [time]
 
     contacts = sim%tally%events + sim%tally%collisions - 2*sim%tally%simultaneous
     proposal = max(share*sim%time()*sim%n_disks()/max(contacts, 1_int64), negligible_times*sim%negligible_time)

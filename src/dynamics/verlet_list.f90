@@ -1,6 +1,7 @@
-!> Verlet lists of close pairs, of two disks or of a disk and an obstacle. Unlisted pairs cannot touch before a disk has moved by
-!> half the `skin`, so a list is valid for many steps (Verlet, Physical Review 159, 98 (1967)). Loops executed in every step have no
-!> branches, so that the compiler can vectorise them.
+!> Verlet lists: close pairs of two disks, or of a disk and an obstacle. Pairs that are not listed
+!> cannot touch before a disk has moved by half the `skin`, so a list is valid for many steps
+!> (Verlet, Physical Review 159, 98 (1967)). Loops executed in every step have no branches, so that
+!> the compiler can vectorise them.
 module verlet_list
   use kinds, only: int32, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -14,24 +15,27 @@ module verlet_list
   private
   public :: verlet_list_t
 
-  integer, parameter :: steps_per_list = 16                !! intended number of steps for which a list is valid
-  !> Intended largest number of pairs per disk in a list, at the mean density.
+  !> Intended number of steps for which a list is valid.
+  integer, parameter :: steps_per_list = 16
+  !> Intended maximum number of pairs per disk in a list, at the mean density.
   real(real64), parameter :: pairs_per_disk = 4.0_real64
-  real(real64), parameter :: least_skin = 0.2_real64       !! smallest skin [mean diameter]
-  real(real64), parameter :: cells_per_disk = 4.0_real64   !! largest number of bins per disk
+  real(real64), parameter :: least_skin = 0.2_real64       !! minimum skin [mean diameters]
+  real(real64), parameter :: cells_per_disk = 4.0_real64   !! maximum number of bins per disk
 
   !> Pairs that may touch: first those of a disk and an obstacle, sorted by obstacle and then by
   !> disk; then those of two disks, sorted by the first and then by the second disk.
   type :: verlet_list_t
     integer(int32) :: n = 0
-    integer(int32), allocatable :: i(:)        !! (at least n) index of the first disk of the pair
-    !> (at least n) index of the second disk, larger than i, or boundary id of an obstacle
+    integer(int32), allocatable :: i(:)        !! index of the first disk of each pair; size at least n
+    !> Index of the second disk of each pair, larger than i, or boundary id of an obstacle; size at
+    !> least n.
     integer(int32), allocatable :: partner(:)
-    integer(int32), allocatable :: hit(:)      !! (at least n) 1 if the members of the pair overlap
+    integer(int32), allocatable :: hit(:)      !! 1 for each overlapping pair, otherwise 0; size at least n
     integer(int32), private :: n_obstacles = 0 !! number of pairs with obstacles
     logical, private :: known = .false.
-    real(real64), private :: skin = 0.0_real64 !! largest gap between the members of a pair [length]
-    real(real64), allocatable, private :: from(:, :)   !! (disks,2) positions when the list was made [length]
+    real(real64), private :: skin = 0.0_real64 !! maximum gap between the members of a listed pair [length]
+    !> Positions when the list was made; shape (disks, 2) [length].
+    real(real64), allocatable, private :: from(:, :)
   contains
     procedure :: update
     procedure :: mark_overlaps
@@ -41,7 +45,7 @@ module verlet_list
 
 contains
 
-  !> Updates the reference position of disk i after it has been shifted by a period.
+  !> Updates the reference position of disk i after a shift by a period.
   subroutine shift(self, i, dx)
     class(verlet_list_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -67,17 +71,19 @@ contains
     self%n = n
   end subroutine remove
 
-  !> Makes a new list, unless all disks have moved by less than half the skin since the last one. With `all_pairs`, a new list is
-  !> made in every step, by testing all pairs. After a stop request the procedure returns early, with an incomplete list.
+  !> Makes a new list, unless all disks have moved by less than half the skin since the last one.
+  !> With `all_pairs`, a new list is made in every step by testing all pairs. After a stop request
+  !> the procedure returns early, with an incomplete list.
   subroutine update(self, sim, x, step, all_pairs)
     class(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    real(real64), contiguous, intent(in) :: x(:, :)   !! (disks,2) positions [length]
-    real(real64), intent(in) :: step           !! [time]
+    real(real64), contiguous, intent(in) :: x(:, :)   !! positions; shape (disks, 2) [length]
+    real(real64), intent(in) :: step           !! length of a step [time]
     logical, intent(in) :: all_pairs
-    real(real64) :: width                      ! width of a bin: a mean diameter and the skin, or more in a very large box [length]
+    ! width of a bin: a mean diameter plus the skin; more in a very large box [length]
+    real(real64) :: width
     type(grid_t) :: bins
-    integer(int32) :: i, k, still              ! number of disks that have moved by less than half the skin
+    integer(int32) :: i, k, still              ! still: number of disks that moved by less than half the skin
 
     if (self%known) then
       still = 0
@@ -112,8 +118,8 @@ contains
     call list_disks(self, sim, x, bins)
   contains
 
-    !> Width of a skin that keeps a list valid for many steps without too many distant pairs. It affects only the speed of the
-    !> program.
+    !> Width of the skin for which a list is valid for many steps without containing too many
+    !> distant pairs. It affects only the speed of the program.
     pure function wanted_skin() result(skin)
       real(real64) :: skin, diameter, reach, fastest
       integer(int32) :: i
@@ -128,12 +134,12 @@ contains
     end function wanted_skin
   end subroutine update
 
-  !> Sets `hit` to 1 for pairs that overlap, and to 0 for all other pairs.
+  !> Sets `hit` to 1 for pairs that overlap, and to 0 for all others.
   pure subroutine mark_overlaps(self, box, x, radius)
     class(verlet_list_t), intent(inout) :: self
     type(box_t), intent(in) :: box
-    real(real64), contiguous, intent(in) :: x(:, :)     !! (disks,2) positions [length]
-    real(real64), contiguous, intent(in) :: radius(:)   !! (disks) [length]
+    real(real64), contiguous, intent(in) :: x(:, :)     !! positions; shape (disks, 2) [length]
+    real(real64), contiguous, intent(in) :: radius(:)   !! radius of each disk [length]
     real(real64) :: period(2)
     integer :: k
 
@@ -149,9 +155,10 @@ contains
     end associate
   end subroutine mark_overlaps
 
-  !> Adds the pairs of close disks. Partners of a disk are searched for among smaller disks, and among equal disks with higher
-  !> indices, so that the search for a small disk covers few bins, however large the largest disk is. The grid of bins is treated as
-  !> periodic along both axes; disks at opposite walls are nevertheless not paired, because their true distance is too large.
+  !> Adds the pairs of close disks. The partners of a disk are searched for among smaller disks, and
+  !> among equal disks with higher indices, so that the search for a small disk covers few bins,
+  !> however large the largest disk is. The grid of bins is treated as periodic along both axes.
+  !> Disks at opposite walls are nevertheless not paired, because their true distance is too large.
   subroutine list_disks(self, sim, x, bins)
     type(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -173,21 +180,22 @@ contains
       centre = [x(i, 1), x(i, 2)]
       reach = (2*sim%disk(i)%radius + self%skin)*(1 + spare)
       low = floor(bins%in_cells(in_box(centre) - reach), int32)
-      high = min(floor(bins%in_cells(in_box(centre) + reach), int32), low + bins%n - 1)    ! the range contains no bin twice
+      ! the range contains no bin twice
+      high = min(floor(bins%in_cells(in_box(centre) + reach), int32), low + bins%n - 1)
       from = 1 + modulo(low(1), bins%n(1))
       to = from + high(1) - low(1)
       do iy = low(2), high(2)
         row = bins%n(1)*modulo(iy, bins%n(2))
         call add_run(row + from, row + min(to, bins%n(1)))
-        call add_run(row + 1, row + to - bins%n(1))           ! the part of the row beyond the periodic side
+        call add_run(row + 1, row + to - bins%n(1))           ! part of the row beyond the periodic side
       end do
     end do
     call sort_pairs(self%i(first_pair:self%n), self%partner(first_pair:self%n), size(x, 1, kind=int32))
 
   contains
 
-    !> Periodic image of a point inside the box, computed with real numbers, because a disk may have crossed more periods than an
-    !> integer can represent.
+    !> Periodic image of a point inside the box, computed with real numbers, because a disk may have
+    !> crossed more periods than an integer can represent.
     pure function in_box(point) result(image)
       real(real64), intent(in) :: point(2)
       real(real64) :: image(2)
@@ -211,7 +219,8 @@ contains
     end subroutine add_run
   end subroutine list_disks
 
-  !> Tests all pairs of disks and adds those separated by less than the skin. A stop request ends this procedure early.
+  !> Tests all pairs of disks and adds those separated by less than the skin. A stop request ends
+  !> the procedure early.
   subroutine test_all_pairs(self, sim, x, radius, period)
     type(verlet_list_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -236,7 +245,8 @@ contains
     end do
   end subroutine test_all_pairs
 
-  !> 1 if the distance between the nearest images of two points in the box is less than sigma, otherwise 0.
+  !> 1 if the distance between the nearest images of two points in the box is less than sigma,
+  !> otherwise 0.
   elemental function near(dx, dy, sigma, period_x, period_y) result(yes)
     real(real64), intent(in) :: dx, dy, sigma, period_x, period_y    !! [length]
     integer(int32) :: yes
