@@ -1,4 +1,4 @@
-!> Executes collisions of a disk with a side or an obstacle.
+!> Executes collisions of disks with sides and obstacles.
 module boundary_collisions
   use kinds, only: int32, never, real64
   use box_geometry, only: next_obstacle, normal_surface_velocity, tangential_surface_velocity, wall_normal
@@ -13,8 +13,8 @@ module boundary_collisions
   private
   public :: collide_wall
 
-  !> Shortest time between successive contacts of a resting disk with the same surface, in contact
-  !> durations.
+  !> Minimum time between successive contacts of a resting disk with the same surface, in units of
+  !> the contact duration.
   real(real64), parameter :: shortest_separation = 0.4_real64
 
 contains
@@ -45,7 +45,8 @@ contains
     else
       sim%disk(i)%v = wall_rebound(law, v - normal_velocity, normal, elastic)
       if (any(abs(normal_velocity) > 0)) then
-        ! The velocity of the disk after rounding is not below that of the side, because rounding is monotonic.
+        ! The rounded velocity of the disk is not below that of the side, because rounding is
+        ! monotonic.
         sim%disk(i)%v = sim%disk(i)%v + normal_velocity
         if (law%restitution < 1 .and. .not. elastic) call end_bouncing(sim%disk(i)%v, v, normal_velocity, normal)
       end if
@@ -59,29 +60,31 @@ contains
     if (counts) call add_wall_sums(sim, i, k, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
 
-  !> Ends a sequence of bounces on a moving side, which could otherwise be infinite: once a collision dissipates less than the
-  !> rounding error, the disk takes the normal velocity of the side.
+  !> Ends a sequence of bounces on a moving side, which could otherwise be infinite: once a
+  !> collision dissipates less than the rounding error, the disk takes the normal velocity of the
+  !> side.
   pure subroutine end_bouncing(v, before, normal_velocity, normal)
     real(real64), intent(inout) :: v(2)          !! velocity of the disk after the collision [length/time]
-    !> Velocity of the disk before the collision, and normal velocity of the side [length/time]
+    !> Velocity of the disk before the collision, and normal velocity of the side [length/time].
     real(real64), intent(in) :: before(2), normal_velocity(2)
-    real(real64), intent(in) :: normal(2)        !! unit vector inwards
+    real(real64), intent(in) :: normal(2)        !! inward unit vector
     real(real64) :: left
 
     left = dot_product(v - normal_velocity, normal)
     if (left >= -dot_product(before - normal_velocity, normal)) v = v - left*normal
   end subroutine end_bouncing
 
-  !> Transfers momentum between a disk and a piston. On entry the disk has the velocity after rebounding from a piston of infinite
-  !> mass; its impulse is reduced to that for the actual mass. On return u is the mean of the piston velocities before and after the
-  !> collision, with which the work of the piston is calculated.
+  !> Transfers momentum between a disk and a piston. On entry the disk has the velocity of its
+  !> rebound from a piston of infinite mass; its impulse is reduced to that for the actual mass. On
+  !> return u is the mean of the piston velocities before and after the collision, with which the
+  !> work of the piston is calculated.
   pure subroutine move_piston(sim, i, code, normal, before, u, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
-    real(real64), intent(in) :: normal(2)        !! unit vector inwards
+    real(real64), intent(in) :: normal(2)        !! inward unit vector
     real(real64), intent(in) :: before(2)        !! velocity of the disk before the collision [length/time]
     real(real64), intent(inout) :: u(2)          !! velocity of the surface [length/time]
-    real(real64), intent(in) :: t                !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: t                !! relative to the time origin `box%epoch` [time]
     real(real64) :: v, given
     integer :: axis
 
@@ -91,19 +94,20 @@ contains
       v = sim%box%side_velocity(1 - code, t)
       given = motion%taken_from(dot_product(disk%v - before, normal), sim%mass_of(i))
       disk%v = disk%v - given*normal
-      ! Moves the piston into contact with the disk, by the formula of `side_time`; otherwise rounding errors would separate it from
-      ! a disk at rest.
+      ! Moves the piston into contact with the disk, by the formula of `side_time`; otherwise
+      ! rounding errors would separate it from a disk at rest.
       side%position = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
         (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
-      side%velocity = min(v - given, dot_product(disk%v, normal))  ! rounding errors must not make the piston faster than the disk
+      ! despite rounding, not faster than the disk
+      side%velocity = min(v - given, dot_product(disk%v, normal))
       side%clock = t
       u = u + (0.5_real64*(side%velocity - v))*normal
     end associate
   end subroutine move_piston
 
-  !> Draws the velocity of disk i after a collision with a thermal wall, as if the disk came from a gas at the wall's temperature.
-  !> The normal component v has the probability density (m v/kT) exp(-m v**2/2kT); the tangential component and the angular velocity
-  !> are Gaussian.
+  !> Draws the velocity of disk i after a collision with a thermal wall, as if the disk came from a
+  !> gas at the temperature of the wall. The normal component v has the probability density (m v/kT)
+  !> exp(-m v**2/2kT); the tangential component and the angular velocity are Gaussian.
   pure subroutine draw_thermal_velocity(sim, i, temperature, normal, u)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -121,12 +125,14 @@ contains
     if (sim%features%rotation) sim%extra(i)%spin = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine draw_thermal_velocity
 
-  !> Separates disk i from a surface on which it rests. With restitution 0 the first collision stops its normal motion, and the
-  !> elastic collisions of the TC model would follow each other infinitely often at the same time. Its normal velocity is therefore
-  !> chosen such that the next contact with the surface is 0.4 to 0.8 contact durations later.
+  !> Separates disk i from a surface on which it rests. With zero restitution the first collision
+  !> stops the normal motion of the disk, after which the elastic collisions of the TC model would
+  !> be infinitely many at one and the same time. The normal velocity is therefore chosen such that
+  !> the next contact with the surface is 0.4 to 0.8 contact durations later.
   !>
-  !> In a container hardly larger than the disk, no velocity achieves this. If the disk leaves the surface by its elastic collision,
-  !> it keeps that velocity; otherwise it takes, of the velocities tried, the one with the latest contact.
+  !> In a container hardly larger than the disk, no velocity achieves this. If the disk leaves the
+  !> surface in an elastic collision, it keeps that velocity. Otherwise, of the velocities tried,
+  !> the one with the latest contact is used.
   pure subroutine separate_from_surface(sim, i, code, normal)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -153,7 +159,8 @@ contains
     end associate
   end subroutine separate_from_surface
 
-  !> Applies the tangential impulse in a collision of disk i with a rough wall, after the normal impulse.
+  !> Applies the tangential impulse in a collision of disk i with a rough wall, after the normal
+  !> impulse.
   pure subroutine apply_tangential_impulse_at_wall(sim, i, law, normal, u, before)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -172,15 +179,17 @@ contains
     end associate
   end subroutine apply_tangential_impulse_at_wall
 
-  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the disk minus the work of the surface
-  !> is the heat transferred by a thermal wall; with the opposite sign, it is the energy dissipated at any other wall.
+  !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the
+  !> disk minus the work of the surface is the heat transferred by a thermal wall; for any other
+  !> wall it is the negative of the dissipated energy.
   pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer, intent(in) :: k                     !! index of the surface
     logical, intent(in) :: heats                 !! whether the surface is a thermal wall
     real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
-    real(real64), intent(in) :: v(2), omega      !! velocities of the disk before the collision [length/time, 1/time]
+    !> Velocity [length/time] and angular velocity [1/time] of the disk before the collision.
+    real(real64), intent(in) :: v(2), omega
     real(real64) :: mass, gained, done
 
     mass = sim%mass_of(i)

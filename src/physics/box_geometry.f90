@@ -1,6 +1,6 @@
-!> The box: four sides (walls or periodic boundaries), fixed obstacles, and gravity. The time at
-!> which a disk touches part of the box depends only on the state of that disk. All times, including
-!> the clocks of disks, are relative to the time origin `box%epoch`.
+!> The box: four sides (walls or periodic boundaries), fixed obstacles, and gravity. The time when a
+!> disk touches part of the box depends only on the state of that disk. All times, including the
+!> clocks of disks, are relative to the time origin `box%epoch`.
 module box_geometry
   use box_side, only: side_t
   use collisions, only: wall_law_t
@@ -15,7 +15,7 @@ module box_geometry
   public :: find_image_contact, free_area, next_obstacle, normal_surface_velocity, obstacle_gap, stays_clear
   public :: tangential_surface_velocity, wall_normal
 
-  !> A side of the box, or a group of obstacles that share one contact law and one set of sums over
+  !> A side of the box, or a group of obstacles with a common contact law and common sums over
   !> collisions.
   type :: surface_t
     character(len=:), allocatable :: name
@@ -24,22 +24,23 @@ module box_geometry
 
   type :: obstacle_t
     class(shape_t), allocatable :: shape
-    integer(int32) :: surface = 0               !! index of the surface that represents the obstacle's group
+    integer(int32) :: surface = 0               !! index of the surface of the obstacle's group
   end type obstacle_t
 
   type :: box_t
     real(real64) :: lower(2) = 0.0_real64       !! [length]
     real(real64) :: upper(2) = 1.0_real64       !! [length]
-    logical :: periodic(2) = .false.            !! periodic boundary along each axis
+    logical :: periodic(2) = .false.            !! whether each axis is periodic
     real(real64) :: gravity(2) = 0.0_real64     !! [length/time**2]
-    real(real64) :: shear_rate = 0.0_real64     !! shear rate of a box with Lees-Edwards boundary conditions [1/time]
+    real(real64) :: shear_rate = 0.0_real64     !! shear rate (Lees-Edwards boundary conditions) [1/time]
     !> The sides (left, right, bottom, top), followed by the groups of obstacles. Elements of
     !> periodic sides are unused.
     type(surface_t), allocatable :: surface(:)
     logical, dimension(n_sides) :: open = .false.  !! whether disks leave the box through each side
-    type(obstacle_t), allocatable :: obstacle(:)   !! the obstacles of a group have consecutive indices
-    type(side_t) :: side(n_sides)               !! motions of the sides in the order left, right, bottom, top
-    real(real64) :: epoch = 0.0_real64          !! time origin of all clocks, measured from the start of the run [time]
+    type(obstacle_t), allocatable :: obstacle(:)   !! obstacles of a group are consecutive
+    type(side_t) :: side(n_sides)               !! motions of the left, right, bottom and top side
+    !> Time origin of all clocks, measured from the start of the run [time].
+    real(real64) :: epoch = 0.0_real64
   contains
     procedure :: edges
     procedure :: periods
@@ -70,7 +71,7 @@ module box_geometry
 
 contains
 
-  !> The unit box, without obstacles.
+  !> The unit box without obstacles.
   function new_box() result(box)
     type(box_t) :: box
     integer :: k
@@ -81,7 +82,7 @@ contains
     end do
   end function new_box
 
-  !> Adds groups of obstacles, whose shapes the caller sets later.
+  !> Adds groups of obstacles. The caller sets their shapes later.
   subroutine add_obstacles(self, name, n)
     class(box_t), intent(inout) :: self
     character(len=*), intent(in) :: name(:)     !! name of each group
@@ -108,7 +109,7 @@ contains
     call move_alloc(obstacle, self%obstacle)
   end subroutine add_obstacles
 
-  !> Lengths of the edges of the box.
+  !> Edges of the box.
   pure function edges(self) result(lengths)
     class(box_t), intent(in) :: self
     real(real64) :: lengths(2)
@@ -124,8 +125,8 @@ contains
     lengths = merge(self%upper - self%lower, never, self%periodic)
   end function periods
 
-  !> Periodic images of the box, for times relative to the time origin `epoch`; by default the start
-  !> of the run.
+  !> Periodic images of the box, for times relative to the time origin `epoch`; by default, the
+  !> start of the run.
   pure function images_of(self, epoch) result(images)
     class(box_t), intent(in) :: self
     real(real64), intent(in), optional :: epoch    !! [time]
@@ -136,7 +137,7 @@ contains
       images = moving_images(self%periods(), self%shear_velocity(), epoch)
   end function images_of
 
-  !> Whether gravity acts on the disks, which then move on parabolas.
+  !> True if gravity acts on the disks, which then move on parabolas.
   pure function has_gravity(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -144,8 +145,8 @@ contains
     yes = any(abs(self%gravity) > 0)
   end function has_gravity
 
-  !> Whether the box is sheared, with the boundary conditions of Lees and Edwards (Journal of
-  !> Physics C 5, 1921 (1972)): the periodic image above the box moves along x.
+  !> True if the box is sheared (Lees and Edwards, Journal of Physics C 5, 1921 (1972)): the
+  !> periodic image above the box moves along x.
   pure function is_sheared(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -171,7 +172,7 @@ contains
     v = [self%shear_rate*(x(2) - 0.5_real64*(self%lower(2) + self%upper(2))), 0.0_real64]
   end function shear_profile
 
-  !> Whether the box has obstacles.
+  !> True if the box contains obstacles.
   pure function has_obstacles(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -188,7 +189,7 @@ contains
     if (allocated(self%obstacle)) n = size(self%obstacle, kind=int32)
   end function n_obstacles
 
-  !> Index of the surface that has the given boundary id.
+  !> Index of the surface with the given boundary id.
   elemental function surface_of(self, code) result(k)
     class(box_t), intent(in) :: self
     integer(int32), intent(in) :: code
@@ -198,7 +199,7 @@ contains
     if (.not. is_side(code)) k = self%obstacle(obstacle_number(code))%surface
   end function surface_of
 
-  !> Whether surface k is a wall, from which disks rebound.
+  !> True if surface k is a wall, from which disks rebound.
   pure function is_wall(self, k) result(yes)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
@@ -208,7 +209,7 @@ contains
     if (.not. yes) yes = .not. self%periodic((k + 1)/2)
   end function is_wall
 
-  !> Whether any wall dissipates energy.
+  !> True if any wall dissipates energy.
   pure function has_lossy_walls(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -218,7 +219,7 @@ contains
       any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%restitution < 1)
   end function has_lossy_walls
 
-  !> Whether any wall can exert a torque on disks.
+  !> True if any wall can exert a torque on disks.
   pure function has_rough_walls(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -227,7 +228,7 @@ contains
     yes = any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%tangential%is_rough())
   end function has_rough_walls
 
-  !> Highest temperature of all thermal walls.
+  !> Maximum temperature of all thermal walls.
   pure function highest_temperature(self) result(highest)
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [energy]
@@ -235,8 +236,8 @@ contains
     highest = maxval(self%surface%law%temperature)
   end function highest_temperature
 
-  !> Highest speed of any boundary: of surfaces that slide, sides that move, and the periodic image
-  !> above a sheared box.
+  !> Maximum speed of all boundaries: sliding surfaces, moving sides, and the periodic image above a
+  !> sheared box.
   pure function highest_speed(self) result(highest)
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [length/time]
@@ -244,7 +245,7 @@ contains
     highest = max(maxval(abs(self%surface%law%speed)), maxval(self%side%highest_speed()), abs(self%shear_velocity()))
   end function highest_speed
 
-  !> Whether boundaries can do work on disks: by sliding, by moving, by the force on a piston, or by
+  !> True if boundaries can do work on disks: by sliding, by moving, by the force on a piston, or by
   !> shear.
   pure function does_work(self) result(yes)
     class(box_t), intent(in) :: self
@@ -253,7 +254,7 @@ contains
     yes = self%highest_speed() > 0 .or. any(self%side%is_piston())
   end function does_work
 
-  !> Whether disks can gain energy from a wall or from shear.
+  !> True if disks can gain energy from a wall or from shear.
   pure function gives_energy(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
@@ -261,11 +262,11 @@ contains
     yes = self%highest_temperature() > 0 .or. self%does_work()
   end function gives_energy
 
-  !> Largest outward displacement of each moving side from its mean position, up to which disks can
-  !> therefore be found beyond the mean position of an oscillating side.
+  !> Maximum outward displacement of each moving side from its mean position. Disks can be this far
+  !> beyond the mean position of an oscillating side.
   pure function side_excursion(self) result(length)
     class(box_t), intent(in) :: self
-    real(real64) :: length(2, 2)                !! (axis, 1: lower side, 2: upper side) [length]
+    real(real64) :: length(2, 2)                !! shape (axis, lower or upper side) [length]
 
     length = transpose(reshape(self%side%reach(), [2, 2]))
   end function side_excursion
@@ -274,7 +275,7 @@ contains
   pure function side_position(self, k, t) result(x)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
-    real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: t               !! relative to the time origin `box%epoch` [time]
     real(real64) :: x                           !! [length]
 
     x = self%side(k)%position(self%epoch, t)
@@ -284,22 +285,23 @@ contains
   pure function side_velocity(self, k, t) result(v)
     class(box_t), intent(in) :: self
     integer, intent(in) :: k
-    real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: t               !! relative to the time origin `box%epoch` [time]
     real(real64) :: v                           !! [length/time]
 
     v = self%side(k)%velocity(self%epoch, t)
   end function side_velocity
 
   !> Finds the first contact of a disk with any of the given obstacles, if it precedes the earliest
-  !> event known so far. Images of an obstacle shifted by at most one period are sufficient: a disk
+  !> event found so far. Images of an obstacle shifted by at most one period are sufficient: a disk
   !> that passes a periodic side is shifted back into the box, and its contacts are predicted anew.
   !> An obstacle that encloses the disks has no images.
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> Last collision partner of the disk (`last_partner`), which can be an obstacle
+    !> Last collision partner of the disk (`last_partner`); may be an obstacle.
     integer(int32), intent(in) :: last
-    integer(int32), intent(in) :: list(:)       !! boundary ids of the obstacles to be tested, in descending order
+    !> Boundary ids of the obstacles to be tested, in descending order.
+    integer(int32), intent(in) :: list(:)
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     type(images_t) :: images
@@ -317,12 +319,12 @@ contains
   end subroutine next_obstacle
 
   !> Finds the contact of a disk with one image of an obstacle, if it precedes the earliest event
-  !> known so far. Without gravity, a disk that has just left a convex obstacle cannot touch it
+  !> found so far. Without gravity, a disk that has just left a convex obstacle cannot touch it
   !> again before another collision; such a contact would be a rounding error and is not predicted.
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    !> Last collision partner of the disk (`last_partner`), which can be an obstacle
+    !> Last collision partner of the disk (`last_partner`); may be an obstacle.
     integer(int32), intent(in) :: last
     integer(int32), intent(in) :: obstacle      !! boundary id of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
@@ -342,14 +344,14 @@ contains
     code = obstacle
   end subroutine find_image_contact
 
-  !> Whether a disk is certain to miss one image of an obstacle before the time t; if not, it may
-  !> touch it. This test costs much less than calculating the contact time.
+  !> True if a disk certainly misses one image of an obstacle until the time t. If the result is
+  !> .false., the disk may touch it. This test costs much less than calculating the contact time.
   pure function stays_clear(box, disk, obstacle, shift, t, falling) result(yes)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int32), intent(in) :: obstacle      !! boundary id of the obstacle
     real(real64), intent(in) :: shift(2)        !! shift from the obstacle to its image [length]
-    real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: t               !! relative to the time origin `box%epoch` [time]
     logical, intent(in) :: falling              !! whether gravity acts on the disk
     logical :: yes
     real(real64) :: d(2)
@@ -366,11 +368,10 @@ contains
     end associate
   end function stays_clear
 
-  !> Whether a point on a straight path is certain to stay outside a circle around the origin for a
-  !> given time; if not, it may enter it. The radius is enlarged by a margin that exceeds all
-  !> rounding errors. A contact before the time s requires c < -2 b s, as in `neighbour_search:
-  !> earliest_contact`. If the circle is the obstacle itself, a point moving away from its centre
-  !> cannot touch it.
+  !> True if a point on a straight path certainly stays outside a circle about the origin for a
+  !> given time. The radius is enlarged by a margin that exceeds all rounding errors. A contact
+  !> before the time s requires c < -2 b s, as in `neighbour_search: earliest_contact`. If the
+  !> circle is the obstacle itself, a point moving away from its centre cannot touch it.
   pure function passes_by(d, v, s, rho, is_round) result(yes)
     real(real64), intent(in) :: d(2)            !! initial position [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
@@ -390,15 +391,15 @@ contains
 
   !> Version of `passes_by` for a falling point. Its parabolic path lies in the triangle formed by
   !> the two ends of the path and the position that would be reached in half the time without
-  !> gravity. The circle misses the triangle if all three corners lie behind a line parallel or
-  !> perpendicular to the chord between the two ends.
+  !> gravity. The circle misses the triangle if all three corners lie behind a line that is parallel
+  !> or perpendicular to the chord between the two ends.
   pure function falls_past(d, v, g, s, rho) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), s, rho
     logical :: yes
     real(real64) :: middle(2), chord(2), chord2, along(2), across(2), clear, slack
 
     yes = .false.
-    if (s > sqrt(never)) return                 ! the length of the path may exceed the largest real number
+    if (s > sqrt(never)) return                 ! the length of the path might overflow
     middle = 0.5_real64*s*v
     chord = s*(v + 0.5_real64*s*g)
     chord2 = chord(1)*chord(1) + chord(2)*chord(2)
@@ -413,9 +414,8 @@ contains
     yes = clear > 0 .and. clear*clear > rho*rho*chord2
   end function falls_past
 
-  !> Whether a falling point is certain to stay outside a rectangle around the origin for a given
-  !> time; if not, it may enter it. Testing the bounding rectangle of the path costs much less than
-  !> solving a quartic equation.
+  !> True if a falling point certainly stays outside a rectangle about the origin for a given time.
+  !> Testing the bounding rectangle of the path costs much less than solving a quartic equation.
   pure function stays_outside(d, v, g, s, half) result(yes)
     real(real64), intent(in) :: d(2)            !! initial position [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
@@ -427,7 +427,7 @@ contains
     integer :: axis
 
     yes = .false.
-    if (s > sqrt(never)) return                 ! the path may be longer than the largest real number
+    if (s > sqrt(never)) return                 ! the length of the path might overflow
     do axis = 1, 2
       low = s*min(v(axis), v(axis) + g(axis)*s, 0.0_real64)
       high = s*max(v(axis), v(axis) + g(axis)*s, 0.0_real64)
@@ -436,8 +436,7 @@ contains
     end do
   end function stays_outside
 
-  !> Distance between the m-th obstacle and the rim of a disk centred at x; negative if the two
-  !> overlap.
+  !> Distance between obstacle m and the rim of a disk centred at x; negative if they overlap.
   pure function obstacle_gap(box, m, x, radius) result(length)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: m
@@ -474,7 +473,7 @@ contains
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
     real(real64), intent(in) :: normal(2)       !! unit vector from the surface to a disk
-    real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: t               !! relative to the time origin `box%epoch` [time]
     real(real64) :: u(2)                        !! [length/time]
 
     u = 0
@@ -482,8 +481,7 @@ contains
     if (allocated(box%side(1 - code)%motion)) u = box%side_velocity(1 - code, t)*normal
   end function normal_surface_velocity
 
-  !> Unit normal vector of a surface at its contact with a disk. It points from the surface to the
-  !> disk.
+  !> Unit normal vector of a surface at its contact with a disk, pointing towards the disk.
   pure function wall_normal(box, code, x, v) result(normal)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
@@ -503,7 +501,7 @@ contains
   end function wall_normal
 
   !> Accessible area: the area of the box, or of a smaller obstacle that encloses the disks, minus
-  !> that of all obstacles that disks touch from outside.
+  !> the area of all obstacles that disks touch from outside.
   pure function free_area(box) result(area)
     type(box_t), intent(in) :: box
     real(real64) :: area                        !! [length**2]

@@ -1,5 +1,6 @@
-!> Positions of the sides of the box, and the times at which disks reach them. Each such time depends only on the state of the disk.
-!> All times, including the clocks of disks, are relative to the time origin `box%epoch`.
+!> Positions of the sides of the box, and the times when disks reach them. Each such time depends
+!> only on the state of the disk. All times, including the clocks of disks, are relative to the time
+!> origin `box%epoch`.
 module box_sides
   use box_geometry, only: box_t
   use disks, only: disk_t
@@ -10,7 +11,8 @@ module box_sides
   private
   public :: bounds, centre_range, separate_from_sides, next_side, side_time, spans
 
-  !> Rounding error of the gap between a disk and a moving side, relative to the magnitude of the coordinates.
+  !> Rounding error of the gap between a disk and a moving side, relative to the magnitude of the
+  !> coordinates.
   real(real64), parameter :: rounding = 16*epsilon(1.0_real64)
 
 contains
@@ -18,7 +20,7 @@ contains
   !> Positions of the sides at a given time.
   pure subroutine bounds(box, t, lower, upper)
     type(box_t), intent(in) :: box
-    real(real64), intent(in) :: t               !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: t               !! relative to the time origin `box%epoch` [time]
     real(real64), intent(out) :: lower(2), upper(2)     !! (left, bottom) and (right, top) sides [length]
     real(real64) :: inwards(n_sides)
     integer :: k
@@ -30,8 +32,8 @@ contains
     upper = box%upper - inwards([2, 4])
   end subroutine bounds
 
-  !> Whether the region extends over the whole period along each axis; .false. along an axis that is not periodic. Where it is
-  !> .true., disks may overlap the edges of the region.
+  !> True for each periodic axis along which the region spans the whole period. Along such an axis
+  !> disks may overlap the edges of the region.
   pure function spans(region, box) result(yes)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
@@ -40,14 +42,15 @@ contains
     yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
   end function spans
 
-  !> Corners of the rectangle available to the centres of disks in a region at a given time. A disk with its centre in this
-  !> rectangle is completely inside the region and overlaps no side, even if a side is displaced from its mean position.
+  !> Corners of the rectangle available to the centres of disks in a region at a given time. A disk
+  !> with its centre in this rectangle is completely inside the region and overlaps no side, even if
+  !> a side is displaced from its mean position.
   pure subroutine centre_range(region, box, radius, lower, upper, t)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: radius              !! [length]
     real(real64), intent(out) :: lower(2), upper(2)
-    !> Time relative to the time origin `box%epoch`; the default is 0 [time]
+    !> Time relative to the time origin `box%epoch`; default: 0 [time].
     real(real64), intent(in), optional :: t
     real(real64) :: inset(2), low(2), high(2), at
 
@@ -56,12 +59,13 @@ contains
     call bounds(box, at, low, high)
     inset = merge(0.0_real64, radius, spans(region, box))
     lower = max(region([1, 3]), low) + inset
-    upper = max(min(region([2, 4]), high) - inset, lower)    ! rounding errors must not make `upper` smaller than `lower`
+    upper = max(min(region([2, 4]), high) - inset, lower)    ! despite rounding, not below `lower`
   end subroutine centre_range
 
-  !> Time at which a disk touches a wall, or its centre reaches a periodic or open side. A gap made negative by rounding is set to
-  !> zero, so that a disk moving outwards at a wall is reflected immediately and cannot leave the box. At a moving side, gaps below
-  !> the rounding error are also set to zero, because a sequence of ever shorter bounces between disk and side would otherwise be
+  !> Time when a disk touches a wall, or its centre reaches a periodic or open side. A gap made
+  !> negative by rounding is set to zero, so that a disk moving outwards at a wall is reflected
+  !> immediately and cannot leave the box. At a moving side, gaps below the rounding error are also
+  !> set to zero; otherwise a sequence of ever shorter bounces between disk and side would be
   !> infinite.
   pure function side_time(box, disk, side) result(t)
     type(box_t), intent(in) :: box
@@ -100,7 +104,7 @@ contains
     gap = distance
     associate (motion => box%side(1 - side)%motion, state => box%side(1 - side)%state)
       since = disk%clock
-      if (motion%is_piston()) then              ! neither the clock of the disk nor that of the piston may be later than the contact
+      if (motion%is_piston()) then              ! the contact must not precede the clock of disk or piston
         since = max(since, state%clock)
         after = since - disk%clock
         gap = gap + flight(0.0_real64, v, g, after)
@@ -113,7 +117,8 @@ contains
     end associate
   end function moving_side_time
 
-  !> The first side that a disk reaches. If it reaches two at the same time, left precedes right, and both precede bottom and top.
+  !> The first side reached by a disk. If the disk reaches two sides at the same time, left precedes
+  !> right, and both precede bottom and top.
   pure subroutine next_side(box, disk, t, side)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -133,13 +138,14 @@ contains
     end do
   end subroutine next_side
 
-  !> Moves a disk away from moving sides that it would touch before the time `now`. A new time origin changes the position and
-  !> velocity of a moving side within rounding errors, which can shift a predicted contact of a disk close to the side to a time
-  !> before `now`. The displacement of the disk is of the order of these errors.
+  !> Moves a disk away from moving sides that it would touch before the time `now`. A new time
+  !> origin changes the position and velocity of a moving side within rounding errors, which can
+  !> shift the predicted contact of a disk close to the side to a time before `now`. The
+  !> displacement of the disk is of the order of these errors.
   pure subroutine separate_from_sides(box, disk, now)
     type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk
-    real(real64), intent(in) :: now             !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: now             !! relative to the time origin `box%epoch` [time]
     real(real64) :: step
     integer(int32) :: side
 
@@ -159,7 +165,7 @@ contains
   pure function gap_rounding_error(disk, axis, reach) result(gap)
     type(disk_t), intent(in) :: disk
     integer, intent(in) :: axis
-    real(real64), intent(in) :: reach           !! of the motion of the side [length]
+    real(real64), intent(in) :: reach           !! maximum displacement of the side [length]
     real(real64) :: gap                         !! [length]
 
     gap = rounding*(abs(disk%x(axis)) + disk%radius + reach)

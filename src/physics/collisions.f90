@@ -7,11 +7,13 @@ module collisions
   public :: contact_law_t, law_choices, normal_rule, pair_impulse, restitution_laws, rule_choices, series_terms, speed_law_t
   public :: tangential_impulse, tangential_law_t, wall_law_t, wall_rebound, wall_rules
 
-  !> Names of the wall rules in the input. The coefficient of restitution multiplies both velocity components of the disk
-  !> ('velocity') or the normal one alone ('normal'). Elsewhere in the program a rule is represented by its position in this list.
+  !> Names of the wall rules in the input. The coefficient of restitution multiplies both velocity
+  !> components of the disk ('velocity') or only the normal component ('normal'). Elsewhere in the
+  !> program a rule is represented by its index in this list.
   character(len=*), parameter :: wall_rules = "velocity normal"
-  integer, parameter :: normal_rule = 2              !! position of the rule 'normal' in `wall_rules`
-  !> Meanings of the rules; in the second table, for the variables `rule` of a single wall and `wall_rule` of all walls.
+  integer, parameter :: normal_rule = 2              !! index of the rule 'normal'
+  !> Meanings of the rules: of the variable `rule` of a single wall, and of the variable `wall_rule`
+  !> of all walls.
   type(choice_t), parameter :: meanings(*) = [ &
     choice_t("", "velocity", "Both components of the velocity are multiplied by the coefficient of restitution, and the " &
       //"normal one is reversed. A single disk without gravity follows the same path as in elastic collisions, at decreasing " &
@@ -24,9 +26,9 @@ module collisions
   type(choice_t), parameter :: rule_choices(*) = [((choice_t(rule_variables(k), meanings(r)%word, meanings(r)%meaning), &
     r=1, size(meanings)), k=1, size(rule_variables))]
 
-  !> Names, in the input, of the laws for the dependence of restitution on the impact velocity. For each law, `series_terms` is the
-  !> coefficient c of the series in `speed_law_t` (3/5 for viscoelastic spheres), or `no_series` if collisions below the reference
-  !> velocity are elastic.
+  !> Keywords of the laws by which restitution depends on the impact velocity. For each law,
+  !> `series_terms` is the coefficient c of the series in `speed_law_t` (3/5 for viscoelastic
+  !> spheres), or `no_series` if collisions below the reference velocity are elastic.
   character(len=*), parameter :: restitution_laws = "constant power viscoelastic elastic_below"
   real(real64), parameter :: no_series = -1.0_real64
   real(real64), parameter :: series_terms(4) = [0.0_real64, 0.0_real64, 0.6_real64, no_series]
@@ -40,12 +42,14 @@ module collisions
     choice_t("restitution_law", "elastic_below", "Collisions at impact speeds below reference_speed are elastic. Smooth disks " &
       //"then never undergo inelastic collapse, and never come to rest.")]
 
-  !> Coefficient of restitution that approaches 1 at small impact velocities (Ramirez, Poschel, Brilliantov and Schwager, Physical
-  !> Review E 60, 4465 (1999)). Below a reference velocity g0 it is 1 - y + c y**2 with y = y0 (g/g0)**(1/5), where y0 is chosen to
-  !> give the value of the input at g0; above g0 it is constant. With c = `no_series` it is 1 below g0.
+  !> Coefficient of restitution that approaches 1 at small impact velocities (Ramirez, Poschel,
+  !> Brilliantov and Schwager, Physical Review E 60, 4465 (1999)). Below a reference velocity g0 it
+  !> is 1 - y + c y**2 with y = y0 (g/g0)**(1/5), where y0 is chosen to give the value of the input
+  !> at g0; above g0 it is constant. With c = `no_series` it is 1 below g0.
   type :: speed_law_t
-    real(real64) :: speed = 0.0_real64               !! reference impact velocity g0; 0 if the restitution is constant [length/time]
-    real(real64) :: c = 0.0_real64                   !! coefficient c of the series 1 - y + c y**2 (see `series_terms`)
+    !> Reference impact velocity g0; 0 for constant restitution [length/time].
+    real(real64) :: speed = 0.0_real64
+    real(real64) :: c = 0.0_real64      !! coefficient c of the series 1 - y + c y**2 (see `series_terms`)
   contains
     procedure :: restitution_at
     procedure :: least
@@ -56,28 +60,30 @@ module collisions
   !> Zippelius, Physical Review E 57, 3416 (1998)).
   type :: tangential_law_t
     real(real64) :: restitution = -1.0_real64        !! tangential restitution, from -1 (smooth) to 1
-    real(real64) :: friction = huge(1.0_real64)      !! Coulomb friction coefficient; huge() if the impulse is not limited
+    !> Coulomb friction coefficient; huge() if the impulse is unlimited.
+    real(real64) :: friction = huge(1.0_real64)
   contains
     procedure :: is_rough
   end type tangential_law_t
 
-  !> The contact law of a wall.
+  !> Contact law of a wall.
   type :: wall_law_t
     real(real64) :: restitution = 1.0_real64
-    integer :: rule = 1                              !! position in `wall_rules`
+    integer :: rule = 1                              !! index of the rule in `wall_rules`
     type(speed_law_t) :: by_speed = speed_law_t()
     type(tangential_law_t) :: tangential = tangential_law_t()
-    real(real64) :: temperature = 0.0_real64         !! kT of a thermal wall; 0 if the wall is not thermal [energy]
+    real(real64) :: temperature = 0.0_real64         !! kT of a thermal wall; 0 for other walls [energy]
     real(real64) :: speed = 0.0_real64               !! tangential velocity of the surface [length/time]
   end type wall_law_t
 
-  !> The contact law of two disks, and the contact duration of all collisions.
+  !> Contact law of disk-disk collisions, and contact duration of all collisions.
   type :: contact_law_t
-    real(real64), allocatable :: restitution(:, :)   !! (species,species) coefficient of restitution, symmetric
+    !> Coefficient of restitution for each pair of species; a symmetric matrix.
+    real(real64), allocatable :: restitution(:, :)
     type(speed_law_t) :: by_speed = speed_law_t()    !! dependence on the impact velocity
     !> Contact duration t_c of the TC model (Luding and McNamara, Granular Matter 1, 113 (1998)): a
     !> collision is elastic if either partner had its previous collision less than t_c earlier
-    !> [time]
+    !> [time].
     real(real64) :: contact_time = 0.0_real64
     type(tangential_law_t) :: tangential = tangential_law_t()  !! tangential interaction of two disks
     real(real64) :: inertia = 0.5_real64             !! moment of inertia divided by mass times radius squared
@@ -88,7 +94,7 @@ module collisions
 
 contains
 
-  !> Whether disk-disk collisions can dissipate energy.
+  !> True if disk-disk collisions can dissipate energy.
   pure function loses_energy(self) result(yes)
     class(contact_law_t), intent(in) :: self
     logical :: yes
@@ -96,8 +102,8 @@ contains
     yes = any(self%restitution < 1) .or. self%tangential%is_rough()
   end function loses_energy
 
-  !> Whether an inelastic collapse is possible. For smooth disks it is prevented by the TC model, or by elastic collisions below a
-  !> reference velocity.
+  !> True if an inelastic collapse is possible. For smooth disks it is prevented by the TC model,
+  !> and by laws with elastic collisions below a reference velocity.
   pure function can_collapse(self) result(yes)
     class(contact_law_t), intent(in) :: self
     logical :: yes
@@ -109,19 +115,19 @@ contains
   !> Coefficient of restitution at an impact velocity.
   elemental function restitution_at(self, restitution, g) result(xi)
     class(speed_law_t), intent(in) :: self
-    real(real64), intent(in) :: restitution          !! coefficient of restitution at the reference velocity g0
+    real(real64), intent(in) :: restitution      !! coefficient of restitution at the reference velocity g0
     real(real64), intent(in) :: g                    !! normal impact velocity [length/time]
     real(real64) :: xi, y
 
     xi = restitution
     if (.not. g < self%speed) return
-    if (self%has_elastic_range()) xi = 1                   ! then y = 0
+    if (self%has_elastic_range()) xi = 1                   ! y = 0
     y = 2*(1 - xi)/(1 + sqrt(max(0.0_real64, 1 - 4*self%c*(1 - xi))))*(g/self%speed)**0.2_real64
     xi = 1 - y + self%c*y**2
   end function restitution_at
 
-  !> Smallest coefficient of restitution in the input for which the series 1 - y + c y**2 decreases up to g0. For this value, the
-  !> minimum of the series is exactly at g0.
+  !> Minimum coefficient of restitution in the input for which the series 1 - y + c y**2 decreases
+  !> up to g0. At this value, the series has its minimum exactly at g0.
   elemental function least(self) result(xi)
     class(speed_law_t), intent(in) :: self
     real(real64) :: xi
@@ -130,7 +136,7 @@ contains
     if (self%c > 0) xi = 1 - 1/(4*self%c)
   end function least
 
-  !> Whether collisions below the reference velocity g0 are elastic.
+  !> True if collisions below the reference velocity g0 are elastic.
   elemental function has_elastic_range(self) result(yes)
     class(speed_law_t), intent(in) :: self
     logical :: yes
@@ -138,8 +144,9 @@ contains
     yes = self%c < 0 .and. self%speed > 0
   end function has_elastic_range
 
-  !> Impulse on disk i, as a multiple q of the separation vector dx = x_j - x_i: v_i changes by q dx/m_i, and v_j by -q dx/m_j. With
-  !> the actual distance of the disks instead of the sum of their radii, energy is conserved up to rounding errors.
+  !> Impulse on disk i, as a multiple q of the separation vector dx = x_j - x_i: v_i changes by q
+  !> dx/m_i, and v_j by -q dx/m_j. The actual distance of the disks is used instead of the sum of
+  !> their radii, so that energy is conserved up to rounding errors.
   pure function pair_impulse(b, distance2, mass_i, mass_j, restitution) result(q)
     real(real64), intent(in) :: b                    !! dx . dv [length**2/time]
     real(real64), intent(in) :: distance2            !! dx . dx [length**2]
@@ -150,7 +157,7 @@ contains
     q = (1 + restitution)*b/distance2*(mass_i*mass_j/(mass_i + mass_j))
   end function pair_impulse
 
-  !> Whether the surfaces are rough, so that tangential impulses occur.
+  !> True if the surfaces are rough, so that tangential impulses occur.
   elemental function is_rough(self) result(yes)
     class(tangential_law_t), intent(in) :: self
     logical :: yes
@@ -158,14 +165,15 @@ contains
     yes = self%restitution > -1
   end function is_rough
 
-  !> Tangential impulse on a body whose surface slips at a contact. The slip velocity is multiplied by -beta, where beta is the
-  !> tangential restitution, unless Coulomb's law limits the impulse.
+  !> Tangential impulse on a body whose surface slips at a contact. The slip velocity is multiplied
+  !> by -beta, where beta is the tangential restitution, unless Coulomb's law limits the impulse.
   pure function tangential_impulse(law, inertia, mass, slip, normal_impulse) result(impulse)
     type(tangential_law_t), intent(in) :: law
-    real(real64), intent(in) :: inertia  !! moment of inertia divided by mass times radius squared, equal for both bodies
+    !> Moment of inertia divided by mass times radius squared, equal for both bodies.
+    real(real64), intent(in) :: inertia
     real(real64), intent(in) :: mass                 !! reduced mass [mass]
-    real(real64), intent(in) :: slip                 !! tangential velocity of the surface at the contact [length/time]
-    real(real64), intent(in) :: normal_impulse       !! magnitude of the normal impulse in the collision [mass length/time]
+    real(real64), intent(in) :: slip      !! tangential velocity of the surface at the contact [length/time]
+    real(real64), intent(in) :: normal_impulse       !! magnitude of the normal impulse [mass length/time]
     real(real64) :: impulse
 
     impulse = -inertia/(1 + inertia)*mass*(1 + law%restitution)*slip
@@ -173,13 +181,14 @@ contains
     if (abs(impulse) > law%friction*normal_impulse) impulse = sign(law%friction*normal_impulse, impulse)
   end function tangential_impulse
 
-  !> Velocity after a collision with a wall at rest. Its normal component points away from the wall even if the disk was already
-  !> moving away, so that a second collision due to rounding errors cannot push the disk through the wall.
+  !> Velocity after a collision with a wall at rest. The normal component points away from the wall
+  !> even if the disk was already moving away, so that a second collision due to rounding errors
+  !> cannot push the disk through the wall.
   pure function wall_rebound(law, v, normal, elastic) result(after)
     type(wall_law_t), intent(in) :: law
     real(real64), intent(in) :: v(2)                 !! [length/time]
     real(real64), intent(in) :: normal(2)            !! unit vector from the wall to the disk
-    logical, intent(in) :: elastic                   !! whether the previous contact of the disk has not ended yet (TC model)
+    logical, intent(in) :: elastic    !! whether the previous contact of the disk has not ended yet (TC model)
     real(real64) :: after(2), approach, restitution
 
     approach = v(1)*normal(1) + v(2)*normal(2)

@@ -1,6 +1,7 @@
-!> Data of the disks, grouped by how often they are needed. The record of a disk fills one cache line and is read in every
-!> prediction. Its tag fills half a cache line and is read only in events of the disk itself. Arrays of optional data exist only in
-!> some simulations. Derived data are not stored in checkpoints but recomputed whenever a run starts or resumes.
+!> Data of the disks, grouped by frequency of use. The record of a disk fills one cache line and is
+!> read in every prediction. Its tag fills half a cache line and is read only in events of the disk
+!> itself. Arrays of optional data exist only in some simulations. Derived data are not stored in
+!> checkpoints; they are recomputed whenever a run starts or resumes.
 module disks
   use free_flight, only: flight, flight_velocity
   use kinds, only: int16, int32, int64, largest_exact, never, real64
@@ -9,52 +10,58 @@ module disks
   public :: disk_t, extra_t, series_t, source_t, species_t, tag_t, whole_disk_t
   public :: disks_before, advance_disk, list_by_id, longest_name, names_of, species_by_id
 
-  !> Position, velocity and clock of a disk change only in its own collisions and when it passes a periodic side. At other times,
-  !> its position is extrapolated from them.
+  !> Position, velocity and clock of a disk change only in its own collisions and when it passes a
+  !> periodic side. At other times, the position is extrapolated from them.
   type :: disk_t
     real(real64) :: x(2) = 0.0_real64           !! position at `clock` [length]
     real(real64) :: v(2) = 0.0_real64           !! velocity at `clock` [length/time]
-    real(real64) :: clock = 0.0_real64          !! time of `x` and `v`, relative to the time origin `box%epoch` [time]
+    real(real64) :: clock = 0.0_real64          !! time of `x` and `v`, relative to `box%epoch` [time]
     real(real64) :: radius = 0.0_real64         !! [length]
-    ! Derived data: the collision counter, and the next event as predicted by the search. The counter is the number of changes of x
-    ! and v in the present epoch; if the counter of the partner has changed, an event is stale.
+    ! Derived data: the collision counter, and the next event as predicted by the search. The
+    ! counter is the number of changes of x and v in the present epoch. If the counter of the
+    ! partner has changed, an event is stale.
     integer(int32) :: collision_counter = 0
-    integer(int32) :: partner = 0               !! partner in the next event: index of a disk (> 0), or another code of `partners`
-    real(real64) :: event_time = 0.0_real64     !! time of the next event, relative to the time origin `box%epoch` [time]
+    integer(int32) :: partner = 0     !! partner in the next event: a disk (> 0) or another code of `partners`
+    real(real64) :: event_time = 0.0_real64     !! time of the next event, relative to `box%epoch` [time]
   end type disk_t
 
   type :: tag_t
     integer(int32) :: species = 1               !! index of the species
-    integer(int32) :: id = 0                    !! number of the disk in the order of the input file
+    integer(int32) :: id = 0                    !! number of the disk in the order of the input
     integer(int64) :: collisions = 0            !! number of events of the disk since the start of the run
-    integer(int32) :: last_partner = 0  !! last collision partner: id of a disk, boundary id of an obstacle, or 0
+    !> Last collision partner: id of a disk, boundary id of an obstacle, or 0.
+    integer(int32) :: last_partner = 0
     ! Derived data for the search and the event queue.
     integer(int16) :: cell(2) = 0_int16         !! column and row in the cell grid
-    integer(int32) :: window = 0                !! time window to which the event queue has assigned the event
-    integer(int32) :: partner_counter = 0       !! collision counter of the partner at the time of the prediction
+    integer(int32) :: window = 0                !! time window of the event in the event queue
+    integer(int32) :: partner_counter = 0     !! collision counter of the partner when the event was predicted
   end type tag_t
 
-  integer, parameter :: longest_name = 40            !! largest length of the name of a species
+  integer, parameter :: longest_name = 40            !! maximum length of the name of a species
 
-  !> A species, whose disks have the same contact law and, unless masses are read from a file, the same mass.
+  !> A species. Its disks have the same contact law and, unless masses are read from a file, the
+  !> same mass.
   type :: species_t
     character(len=:), allocatable :: name
     integer :: count = 0
-    real(real64) :: mass = 1.0_real64           !! mass of each disk; the largest one if they differ [mass]
+    real(real64) :: mass = 1.0_real64           !! mass of each disk; the maximum if masses differ [mass]
   end type species_t
 
-  !> A source, through which waiting disks of a species enter the box at the multiples of its interval, at random free positions.
+  !> A source. Waiting disks of a species enter the box through the source at multiples of its
+  !> interval, at random free positions.
   type :: source_t
     character(len=:), allocatable :: name
     integer :: species = 1                      !! index of the species
-    real(real64) :: region(4) = 0.0_real64      !! region in which the disks enter: xlo, xhi, ylo, yhi [length]
+    real(real64) :: region(4) = 0.0_real64      !! region in which disks enter: xlo, xhi, ylo, yhi [length]
     real(real64) :: interval = never            !! [time]
-    integer :: count = 1                        !! largest number of disks that enter at one time
-    real(real64) :: velocity(2) = 0.0_real64    !! velocity of entering disks, if `temperature` is 0 [length/time]
-    !> kT of the Maxwell distribution from which velocities of entering disks are drawn; 0 if they are not drawn [energy]
+    integer :: count = 1                        !! maximum number of disks that enter at one time
+    !> Velocity of entering disks if `temperature` is 0 [length/time].
+    real(real64) :: velocity(2) = 0.0_real64
+    !> kT of the Maxwell distribution from which the velocities of entering disks are drawn; 0 for a
+    !> fixed velocity [energy].
     real(real64) :: temperature = 0.0_real64
-    real(real64) :: start_time = 0.0_real64     !! earliest time at which disks enter [time]
-    real(real64) :: end_time = never            !! latest time at which disks enter [time]
+    real(real64) :: start_time = 0.0_real64     !! earliest time when disks enter [time]
+    real(real64) :: end_time = never            !! latest time when disks enter [time]
   contains
     procedure :: next_multiple
     procedure :: speed2
@@ -65,28 +72,32 @@ module disks
     !> Image counters, stored as reals: number of periods crossed along each axis. The unwrapped
     !> position is x + image*edges.
     real(real64) :: image(2) = 0.0_real64
-    real(real64) :: last_contact = 0.0_real64   !! time of the last contact (TC model), relative to `box%epoch` [time]
+    !> Time of the last contact (TC model), relative to `box%epoch` [time].
+    real(real64) :: last_contact = 0.0_real64
     real(real64) :: spin = 0.0_real64           !! angular velocity [1/time]
     real(real64) :: angle = 0.0_real64          !! orientation at `clock`, unwrapped [radian]
   end type extra_t
 
-  !> Membership of a disk in a series: collisions at one and the same time that are connected by shared disks (see `collapses`).
+  !> Membership of a disk in a series of collisions, which occur at one and the same time and are
+  !> connected by common disks (see `collapses`).
   type :: series_t
-    real(real64) :: time = -never               !! time of the last series, relative to the time origin `box%epoch` [time]
-    !> Id of a disk of the same series, which leads to the disk that represents the series
+    real(real64) :: time = -never               !! time of the last series, relative to `box%epoch` [time]
+    !> Id of a disk of the same series; leads to the disk that represents the series.
     integer(int32) :: root = 0
-    integer(int32) :: disks = 0                 !! number of disks in the series that this disk represents
-    integer(int64) :: collisions = 0            !! number of collisions in the series that this disk represents
-    integer(int64) :: known_until = 0           !! number of events of this disk up to which no collapse is possible
-    !> Smallest number of events until the disk is examined again (see `collapses: judge`)
+    integer(int32) :: disks = 0                 !! number of disks in the series represented by this disk
+    !> Number of collisions in the series represented by this disk.
+    integer(int64) :: collisions = 0
+    !> Number of events of this disk up to which no collapse is possible.
+    integer(int64) :: known_until = 0
+    !> Minimum number of events until the disk is examined again (see `collapses: judge`).
     integer(int64) :: patience = 0
   end type series_t
 
-  !> All data of one disk in a single type, so that they can be copied together.
+  !> All data of one disk in a single type, to be copied together.
   type :: whole_disk_t
     type(disk_t) :: disk
     type(tag_t) :: tag
-    real(real64) :: own_mass = 0.0_real64       !! mass of the disk, if masses within a species differ [mass]
+    real(real64) :: own_mass = 0.0_real64       !! mass of the disk if masses within a species differ [mass]
     type(extra_t) :: extra
   end type whole_disk_t
 
@@ -107,7 +118,7 @@ contains
     index = pack(index_of, index_of > 0)
   end subroutine list_by_id
 
-  !> Advances a disk along its free flight to the time t.
+  !> Advances a disk in free flight to the time t.
   pure subroutine advance_disk(disk, gravity, t)
     type(disk_t), intent(inout) :: disk
     real(real64), intent(in) :: gravity(2), t
@@ -120,11 +131,12 @@ contains
     disk%collision_counter = disk%collision_counter + 1
   end subroutine advance_disk
 
-  !> Number of the first multiple of the interval after a given time and between start and end of the source; 0 if there is none.
-  !> A multiple within a few rounding errors of the start or the end counts as inside (3 x 0.1 > 0.3 in double precision).
+  !> Number of the first multiple of the interval after a given time and between the start and the
+  !> end of the source; 0 if there is none. A multiple within a few rounding errors of the start or
+  !> the end counts as inside (3 x 0.1 > 0.3 in double precision).
   pure function next_multiple(self, after) result(k)
     class(source_t), intent(in) :: self
-    real(real64), intent(in) :: after             !! time since the start of the run [time]
+    real(real64), intent(in) :: after             !! since the start of the run [time]
     integer(int64) :: k
     real(real64) :: first, last                   ! [time]
 
@@ -139,7 +151,7 @@ contains
     if (k*self%interval > last) k = 0
   end function next_multiple
 
-  !> Mean square of the velocity of entering disks.
+  !> Mean square of the velocities of entering disks.
   elemental function speed2(self, mass)
     class(source_t), intent(in) :: self
     real(real64), intent(in) :: mass              !! [mass]
@@ -168,7 +180,7 @@ contains
     n = sum(species(:s - 1)%count)
   end function disks_before
 
-  !> Index of the species of each disk, in the order of the ids of the disks.
+  !> Index of the species of each disk, in the order of ids.
   pure function species_by_id(species) result(number)
     class(species_t), intent(in) :: species(:)
     integer(int32), allocatable :: number(:)

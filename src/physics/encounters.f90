@@ -1,5 +1,6 @@
-!> Executes events: applies the contact law to colliding disks and walls, moves disks through periodic sides, and updates counters
-!> and sums. Used by both the event-driven and the time-stepped dynamics.
+!> Executes events: applies the contact law to colliding disks and walls, moves disks through
+!> periodic sides, and updates counters and sums. Used by the event-driven and the time-stepped
+!> dynamics.
 module encounters
   use kinds, only: int32, int64, real64
   use collisions, only: pair_impulse, tangential_impulse
@@ -23,7 +24,7 @@ module encounters
 
 contains
 
-  !> Whether all collisions need the general procedure `collide`. An event log needs it as well.
+  !> True if all collisions need the general procedure `collide`. An event log needs it as well.
   pure function need_general(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -31,8 +32,8 @@ contains
     yes = sim%features%need_general_collision() .or. sim%law%by_speed%speed > 0
   end function need_general
 
-  !> Executes the collision of disk i at the time t with the partner `code`, by the general procedure or by the fast ones for pairs
-  !> and walls.
+  !> Executes the collision of disk i at the time t with the partner `code`, by the general
+  !> procedure or by the fast ones for pairs and walls.
   subroutine execute_collision(sim, i, code, t, counts, general, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -51,14 +52,15 @@ contains
     end if
   end subroutine execute_collision
 
-  !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or an obstacle. This general
-  !> procedure handles rotation, friction, velocity-dependent restitution, the virial tensor and the event log; `collide_pair` is
-  !> the fast one for smooth disks without these features. The log entry does not depend on which of the two disks predicted the
-  !> event. A pair still in contact after its last collision is skipped.
+  !> Executes the collision of disk i at the time t with the partner `code`: another disk, a side or
+  !> an obstacle. This general procedure handles rotation, friction, velocity-dependent restitution,
+  !> the virial tensor and the event log; `collide_pair` is the fast version for smooth disks
+  !> without these features. The log entry does not depend on which of the two disks predicted the
+  !> event. A pair that is still in contact after its last collision is skipped.
   subroutine collide(sim, i, code, t, counts, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: code           !! index of a disk (> 0), or code of a side or obstacle: see `partners`
+    integer(int32), intent(in) :: code           !! index of a disk (> 0), or boundary id (see `partners`)
     real(real64), intent(in) :: t
     logical, value :: counts                     !! whether the collision is included in the tally and the log
     type(event_log_t), intent(inout), optional :: log
@@ -101,13 +103,15 @@ contains
     call log%append([sim%box%epoch + t, real(ids, real64), impulse_between(sim, first, second, v, w), change])
   end subroutine collide
 
-  !> Executes the collision of disks i and j at the time t. The result is bit-identical if i and j are exchanged.
+  !> Executes the collision of disks i and j at the time t. The result is bit-identical if i and j
+  !> are exchanged.
   subroutine collide_pair(sim, i, j, t, counts, restitution)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
     logical, value :: counts                     !! whether the collision is included in the tally
-    real(real64), value :: restitution           !! coefficient of restitution, unless the TC model makes the collision elastic
+    !> Coefficient of restitution, unless the TC model makes the collision elastic.
+    real(real64), value :: restitution
     real(real64) :: dx(2), dv(2), b, distance2, q, mass_i, mass_j
     integer(int32) :: si, sj
     logical :: elastic
@@ -132,13 +136,13 @@ contains
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
     mass_i = sim%species(si)%mass
     mass_j = sim%species(sj)%mass
-    if (allocated(sim%own_mass)) then                ! faster than `mass_of`, which would test the allocation for each disk
+    if (allocated(sim%own_mass)) then   ! faster than `mass_of`, which would test the allocation for each disk
       mass_i = sim%own_mass(i)
       mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    ! The impulse is divided by the mass: multiplication by a stored reciprocal mass would repeat the same rounding error in all
-    ! collisions.
+    ! The impulse is divided by the mass, because multiplying it by a stored reciprocal mass would
+    ! repeat the same rounding error in all collisions.
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
@@ -160,13 +164,14 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
-    real(real64) :: g, dx(2), dv(2)              ! [length/time], separation [length], relative velocity [length/time]
+    real(real64) :: g, dx(2), dv(2)      ! normal impact velocity, separation [length], relative velocity
 
     call relative_motion(sim, i, j, t, dx, dv)
     g = abs(dot_product(dx, dv))/magnitude(dx)
   end function impact_velocity
 
-  !> Separation and relative velocity of disk i and the nearest periodic image of disk j at the time t.
+  !> Separation and relative velocity of disk i and the nearest periodic image of disk j at the time
+  !> t.
   pure subroutine relative_motion(sim, i, j, t, dx, dv)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -184,7 +189,8 @@ contains
     call use_nearest_image(sim, t, dx, dv)
   end subroutine relative_motion
 
-  !> Applies the tangential impulse in a collision of the rough disks i and j, after the normal impulse.
+  !> Applies the tangential impulse in a collision of the rough disks i and j, after the normal
+  !> impulse.
   subroutine apply_tangential_impulse(sim, i, j, normal_impulse, counts)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -196,7 +202,7 @@ contains
       along = q%x - p%x
       dv = q%v - p%v
       call use_nearest_image(sim, p%clock, along, dv)
-      along = [along(2), -along(1)]/magnitude(along)             ! tangential unit vector z x n, where n points from j to i
+      along = [along(2), -along(1)]/magnitude(along)      ! unit vector z x n, where n points from j to i
       dv = -dv
       slip = dot_product(dv, along) - (p%radius*sim%spin(i) + q%radius*sim%spin(j))
       mass_i = sim%mass_of(i)
@@ -213,13 +219,14 @@ contains
     call remove_residual_approach(sim, i, j)
   end subroutine apply_tangential_impulse
 
-  !> Change of the momentum of disk i in a collision with a surface or with disk j. If i is far heavier than j, rounding errors
-  !> dominate its own velocity change, and the momentum change is computed from that of j.
+  !> Momentum change of disk i in a collision with a surface or with disk j. If disk i is far
+  !> heavier than disk j, its velocity change is dominated by rounding errors, and the momentum
+  !> change is computed from that of disk j.
   pure function momentum_change(sim, i, j, v, w) result(change)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: j              !! index of the partner disk; not positive if the partner is a surface
-    real(real64), intent(in) :: v(2), w(2)       !! velocities of disks i and j before the collision [length/time]
+    integer(int32), intent(in) :: j              !! index of the other disk; not positive for a surface
+    real(real64), intent(in) :: v(2), w(2)   !! velocities of disks i and j before the collision [length/time]
     real(real64) :: change(2)                    !! [mass length/time]
 
     if (is_far_heavier(sim, i, j)) then
@@ -233,8 +240,8 @@ contains
   pure function impulse_between(sim, i, j, v, w) result(impulse)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: j              !! index of the partner disk; not positive if the partner is a surface
-    real(real64), intent(in) :: v(2), w(2)       !! velocities of disks i and j before the collision [length/time]
+    integer(int32), intent(in) :: j              !! index of the other disk; not positive for a surface
+    real(real64), intent(in) :: v(2), w(2)   !! velocities of disks i and j before the collision [length/time]
     real(real64) :: impulse                      !! [mass length/time]
 
     if (is_far_heavier(sim, i, j)) then
@@ -244,7 +251,8 @@ contains
     end if
   end function impulse_between
 
-  !> Whether disk i is so much heavier than disk j that its velocity change loses significant digits.
+  !> True if disk i is so much heavier than disk j that its velocity change loses significant
+  !> digits.
   pure function is_far_heavier(sim, i, j) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -254,11 +262,12 @@ contains
     if (yes) yes = sim%mass_of(i) > far_heavier*sim%mass_of(j)
   end function is_far_heavier
 
-  !> Translational energy transferred from disk j to disk i: the mean of the energy gained by i and the energy lost by j.
+  !> Translational energy transferred from disk j to disk i: the mean of the energy gained by i and
+  !> the energy lost by j.
   pure function transferred_energy(sim, i, j, v, w) result(energy)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
-    real(real64), intent(in) :: v(2), w(2)       !! velocities of disks i and j before the collision [length/time]
+    real(real64), intent(in) :: v(2), w(2)   !! velocities of disks i and j before the collision [length/time]
     real(real64) :: energy
 
     if (is_far_heavier(sim, i, j) .or. is_far_heavier(sim, j, i)) then
@@ -278,8 +287,9 @@ contains
     energy_gain = 0.5_real64*sim%mass_of(i)*dot_product(sim%disk(i)%v - before, sim%disk(i)%v + before)
   end function energy_gain
 
-  !> Adds a collision of disks i and j to the virial tensor, the collisional heat flux, and the work of the shear, which is done
-  !> only across the lower or upper boundary of a sheared box.
+  !> Adds a collision of disks i and j to the virial tensor, the collisional heat flux, and the work
+  !> of the shear. The shear does work only in collisions across the lower or upper boundary of a
+  !> sheared box.
   subroutine add_pair_sums(sim, i, j, change, transferred_energy)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -312,15 +322,16 @@ contains
     type(images_t) :: images
     type(image_t) :: image
 
-    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! the image of disk j in the box is usually the nearest
+    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! usually the disk in the box is nearest
     images = sim%images()
     image = images%image(images%nearest_image(dx, t))
     dx = dx + [image%shift(1) + image%velocity*t, image%shift(2)]
     dv(1) = dv(1) + image%velocity
   end subroutine use_nearest_image
 
-  !> Whether disks i and j, touching at the time t, are still in contact after their last collision, through the same periodic
-  !> image. Free disks can then approach each other only because of the rounding error from the shift of one of them by a period.
+  !> True if disks i and j, touching at the time t, are still in contact after their last collision,
+  !> through the same periodic image. Free disks can then approach each other only because of a
+  !> rounding error, from the shift of one of them by a period.
   pure function are_in_contact(sim, i, j, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -340,9 +351,9 @@ contains
     end associate
   end function are_in_contact
 
-  !> Removes the approach velocity that rounding errors can leave after a collision of two disks. The test uses the same expression
-  !> as the prediction of contacts, so that no further collision of the pair is predicted. No event is counted, and the clocks do
-  !> not change.
+  !> Removes the approach velocity that rounding errors can leave after a collision of two disks.
+  !> The test uses the same expression as the prediction of contacts, so that the pair is not
+  !> predicted to collide again. No event is counted, and the clocks do not change.
   pure subroutine remove_residual_approach(sim, i, j)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -368,7 +379,7 @@ contains
     end associate
   end subroutine remove_residual_approach
 
-  !> Whether a code represents a periodic or an open side, through which disks pass.
+  !> True if a code represents a periodic or an open side, through which disks pass.
   pure function is_passage(sim, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: code
@@ -378,12 +389,13 @@ contains
     if (is_side(code)) yes = sim%box%periodic(axis_of(code)) .or. sim%box%open(1 - code)
   end function is_passage
 
-  !> Lets disk i leave the box through an open side at the time t. The departure is an event, but not a collision. If disk i becomes
-  !> the first waiting disk of a source, the source does not make up for the multiples of its interval before the departure.
+  !> Lets disk i leave the box through an open side at the time t. The departure is an event but not
+  !> a collision. If disk i becomes the first waiting disk of a source, the source does not make up
+  !> for the intervals before the departure.
   subroutine depart(sim, i, code, t, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: code           !! code of the side: see `partners`
+    integer(int32), intent(in) :: code           !! code of the side; see `partners`
     real(real64), intent(in) :: t
     type(event_log_t), intent(inout), optional :: log
     integer :: k
@@ -409,7 +421,8 @@ contains
     end associate
   end subroutine depart
 
-  !> Kinetic, rotational and potential energy of disk i at its clock. The potential energy is zero at the origin of the coordinates.
+  !> Kinetic, rotational and potential energy of disk i at its clock. The potential energy is zero
+  !> at the origin of the coordinates.
   pure function energy_of(sim, i) result(energy)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
@@ -421,7 +434,8 @@ contains
     if (sim%features%rotation) energy = energy + 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
   end function energy_of
 
-  !> Moves disk i by one period as it passes a periodic side at the time t. Its clock does not change.
+  !> Moves disk i by one period when it passes a periodic side at the time t. Its clock does not
+  !> change.
   subroutine pass_side(sim, i, code, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -441,12 +455,13 @@ contains
     end associate
   end subroutine pass_side
 
-  !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards), shifting its position by the displacement of
-  !> the periodic image and its velocity by that of the image. The reference frame changes; no force acts on the disk.
+  !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards): its position
+  !> is shifted by the displacement of the periodic image, and its velocity by the velocity of the
+  !> image. This is a change of the reference frame; no force acts on the disk.
   subroutine pass_sheared_boundary(sim, i, rows, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    integer, intent(in) :: rows                  !! 1 for the upper boundary, -1 for the lower boundary
+    integer, intent(in) :: rows                  !! 1 at the upper boundary, -1 at the lower one
     real(real64), intent(in) :: t
     type(images_t) :: images
     real(real64) :: v, columns
@@ -466,7 +481,7 @@ contains
   !> Part of a message: disk i, its partner and the present time.
   pure function encounter_text(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i, code           !! index of the disk and code of its partner (see `partners`)
+    integer(int32), intent(in) :: i, code      !! index of the disk and code of its partner; see `partners`
     character(len=:), allocatable :: text
 
     text = disk_text(i)

@@ -1,5 +1,5 @@
-!> Event log: the collisions that have not been written to the output file yet. The dynamics appends
-!> collisions; the caller writes them and empties the list.
+!> Event log: collisions that have not been written to the output file yet. The dynamics appends
+!> collisions; the caller writes them and empties the log.
 module event_log
   use kinds, only: real64
   implicit none
@@ -12,10 +12,10 @@ module event_log
     !> Number of entries at which the dynamics returns to the caller.
     integer :: most = huge(0)
     integer :: n = 0                              !! number of entries
-    !> (6, at least n) One column per collision: the time since the start of the run [time], the ids
-    !> of disks i and j, and the magnitude and the two components of the momentum change of disk i
-    !> [mass length/time]. In collisions with walls, the boundary id replaces the id of disk j (see
-    !> `partners`).
+    !> One column per collision: the time since the start of the run [time], the ids of disks i and
+    !> j, and the magnitude and the two components of the momentum change of disk i [mass
+    !> length/time]. For collisions with walls, the boundary id replaces the id of disk j (see
+    !> `partners`). The shape is (6, at least n).
     real(real64), allocatable :: record(:, :)
   contains
     procedure :: append
@@ -24,7 +24,7 @@ module event_log
 
 contains
 
-  !> Whether the log is full and has to be emptied; .false. if there is no log.
+  !> True if the log is full and has to be emptied; .false. without a log.
   pure function is_full(log) result(yes)
     type(event_log_t), intent(in), optional :: log
     logical :: yes

@@ -6,16 +6,17 @@ module exact_sums
   private
   public :: exact_sum_t
 
-  integer, parameter :: digits_of_bound = 62             !! number of binary digits of a term that equals the bound of `choose_unit`
+  !> Number of binary digits of a term as large as the bound of `choose_unit`.
+  integer, parameter :: digits_of_bound = 62
   integer, parameter :: digits_of_rare = 90              !! binary logarithm of `rare_unit`
   real(real64), parameter :: most_units = 2.0_real64**digits_of_bound
   real(real64), parameter :: rare_unit = 2.0_real64**digits_of_rare
   integer, parameter :: digits_of_most = 125
-  !> Limit of the component `rare` of a sum, beyond which its value is NaN.
+  !> Maximum of the component `rare` of a sum, beyond which its value is NaN.
   integer(int128), parameter :: most = 2_int128**digits_of_most
 
   !> A fixed-point sum. Terms above the bound passed to `choose_unit` are also added exactly, at a
-  !> slightly higher cost. 2**35 terms below 2**90 units cannot overflow; of larger terms, the
+  !> slightly higher cost. Up to 2**35 terms below 2**90 units cannot overflow; of larger terms, the
   !> multiples of 2**90 units are counted in `rare`.
   type :: exact_sum_t
     integer(int128) :: units = 0
@@ -33,7 +34,7 @@ module exact_sums
 
 contains
 
-  !> Chooses the unit such that a term as large as `bound` has 62 binary digits. Terms already added
+  !> Chooses the unit such that a term as large as `bound` has 62 binary digits. Terms added earlier
   !> are converted to the new unit.
   elemental subroutine choose_unit(self, bound)
     class(exact_sum_t), intent(inout) :: self
@@ -50,10 +51,10 @@ contains
     if (finer < 0) call self%make_coarser(min(-finer, digits_of_most))
   end subroutine choose_unit
 
-  !> Divides the unit of the sum by 2 to the power `digits`.
+  !> Divides the unit of the sum by 2**`digits`.
   elemental subroutine make_finer(self, digits)
     class(exact_sum_t), intent(inout) :: self
-    integer, intent(in) :: digits                        !! binary logarithm of the factor by which the unit changes
+    integer, intent(in) :: digits                        !! binary logarithm of the factor
     integer(int128) :: moved
 
     if (self%units == 0 .and. self%rare == 0) return
@@ -68,10 +69,10 @@ contains
     end if
   end subroutine make_finer
 
-  !> Multiplies the unit of the sum by 2 to the power `digits`.
+  !> Multiplies the unit of the sum by 2**`digits`.
   elemental subroutine make_coarser(self, digits)
     class(exact_sum_t), intent(inout) :: self
-    integer, intent(in) :: digits                        !! binary logarithm of the factor by which the unit changes
+    integer, intent(in) :: digits                        !! binary logarithm of the factor
     integer(int128) :: left
 
     left = self%rare/2_int128**digits
@@ -80,8 +81,8 @@ contains
     self%rare = left
   end subroutine make_coarser
 
-  !> Adds a term, rounded to a multiple of the unit. With truncation instead, the errors of many
-  !> small terms would have the same sign.
+  !> Adds a term, rounded to a multiple of the unit. Truncation would give the errors of many small
+  !> terms the same sign.
   elemental subroutine add(self, term)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: term
@@ -90,7 +91,7 @@ contains
     units = term*self%per_one
     if (abs(units) < most_units) then
       self%units = self%units + int(units + sign(0.5_real64, units), int64)
-    else if (abs(units) < rare_unit) then              ! two conversions to 64 bits are faster than one to 128 bits
+    else if (abs(units) < rare_unit) then      ! two 64-bit conversions are faster than one 128-bit conversion
       upper = aint(units/most_units)
       self%units = self%units + int(upper, int64)*2_int128**digits_of_bound + int(units - upper*most_units, int64)
     else
@@ -98,8 +99,8 @@ contains
     end if
   end subroutine add
 
-  !> Adds a very large term in two parts. Both are exact, because a double-precision number has
-  !> fewer digits than either of the two integers that represent the sum.
+  !> Adds a very large term in two parts. Both parts are exact, because a double-precision number
+  !> has fewer digits than either of the two integers that represent the sum.
   elemental subroutine add_rare(self, units)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: units
@@ -114,7 +115,7 @@ contains
     end if
   end subroutine add_rare
 
-  !> Adds the terms of another sum that has the same unit.
+  !> Adds the terms of another sum with the same unit.
   elemental subroutine include(self, other)
     class(exact_sum_t), intent(inout) :: self
     type(exact_sum_t), intent(in) :: other

@@ -1,6 +1,6 @@
-!> Optional features of a run, without which the motion consists of free flight and of collisions that change only velocities. The
-!> features determine which per-disk data and observables are available, which collision procedure is used, and which inputs are
-!> rejected.
+!> Optional features of a run. Without them, the motion consists of free flight and of collisions
+!> that change only velocities. The features determine which per-disk data and observables are
+!> available, which collision procedure is used, and which inputs are rejected.
 module features
   implicit none
   private
@@ -9,10 +9,11 @@ module features
   type :: features_t
     logical :: own_sizes = .false.      !! whether disks have individual masses and radii
     logical :: rotation = .false.       !! whether disks can rotate
-    logical :: orientation = .false.    !! whether disks have an orientation (always, if disks can rotate)
-    logical :: stress = .false.         !! whether momentum changes are added to the stress tensor and the event log
+    logical :: orientation = .false.    !! whether disks have an orientation, as all disks that can rotate
+    !> Whether the stress tensor and the event log include momentum changes.
+    logical :: stress = .false.
     logical :: helfand = .false.        !! whether the Helfand moments are accumulated
-    ! Features of runs with scheduled changes, whose data and observables exist from the start.
+    ! Features of runs with scheduled changes; their data and observables exist from the start.
     logical :: changes = .false.        !! whether changes are scheduled
     logical :: collapses = .false.      !! whether an inelastic collapse is possible, now or after a change
     logical :: moving(4) = .false.      !! whether each side moves, now or after a change
@@ -24,7 +25,8 @@ module features
 
 contains
 
-  !> Adds those features of another system of the same run that determine data and observables.
+  !> Adds the features of another system of the same run, as far as they determine data and
+  !> observables.
   pure subroutine unite(self, other)
     class(features_t), intent(inout) :: self
     type(features_t), intent(in) :: other
@@ -36,7 +38,7 @@ contains
     self%open = self%open .or. other%open
   end subroutine unite
 
-  !> Whether collisions need the general procedure instead of the fast one.
+  !> True if collisions need the general procedure instead of the fast one.
   pure function need_general_collision(self) result(yes)
     class(features_t), intent(in) :: self
     logical :: yes

@@ -25,33 +25,38 @@ module observables
 
   type :: observable_list_t
     integer :: n = 0
-    type(observable_t), allocatable :: row(:)     !! (at least n) the observables; only the first n elements are used
+    type(observable_t), allocatable :: row(:)     !! the observables in the first n elements
   contains
     procedure :: add
     procedure :: values
   end type observable_list_t
 
-  !> Positions, in the first dimension of an array of sums, of the sums over the disks of a species or over all disks.
+  !> Indices of the sums over the disks of a species, or over all disks, in the first dimension of
+  !> an array of sums.
   integer, parameter :: disks = 1, mass = 2, speed = 3, momentum = 4       !! momentum has two components
   integer, parameter :: kinetic = 6, potential = 7, rotational = 8         !! energies
-  !> Kinetic energy and momentum relative to the velocity profile of a sheared box; the momentum has two components.
+  !> Kinetic energy and momentum relative to the velocity profile of a sheared box; momentum has two
+  !> components.
   integer, parameter :: own_kinetic = 9, own_momentum = 10
-  integer, parameter :: flux = 12  !! kinetic flux relative to the velocity profile, five components (see `tally: kinetic_flux`)
-  integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]                    !! components xx, xy, yx, yy of the momentum flux
-  !> Position of the last sum over disks; a new sum is inserted after the kinetic flux and becomes the last one.
+  !> Kinetic flux relative to the velocity profile; five components (see `tally: kinetic_flux`)
+  integer, parameter :: flux = 12
+  integer, parameter :: tensor(*) = flux + [0, 1, 1, 2]      !! components xx, xy, yx, yy of the momentum flux
+  !> Index of the last sum over disks. A new sum is inserted after the kinetic flux.
   integer, parameter :: last_term = flux + 4
-  !> Total energy (`energy`) and rounding error of its summation (`lost`), both computed only in driven simulations.
+  !> Total energy (`energy`) and rounding error of its summation (`lost`), computed only in driven
+  !> simulations.
   integer, parameter :: energy = last_term + 1, lost = last_term + 2
 
 contains
 
-  !> Present values of all observables. To add an observable, add a line here.
+  !> Present values of all observables. A new observable is added here, as one line.
   pure function observed(sim) result(list)
     type(simulation_t), intent(in) :: sim
     type(observable_list_t) :: list
-    real(real64) :: sums(lost, 0:size(sim%species))   ! sums over the disks of each species; index 0: sums over all disks
+    ! sums over the disks of each species and, for index 0, over all disks
+    real(real64) :: sums(lost, 0:size(sim%species))
     character(len=:), allocatable :: path
-    real(real64) :: flux_integral(5)                          ! time integrals of the fluxes [energy time], [energy length]
+    real(real64) :: flux_integral(5)      ! time integrals of the fluxes [energy time], [energy length]
     real(real64) :: at(2, 2)                          ! positions of the lower and upper sides [length]
     logical :: changes                                ! whether the system changes during the run
     integer :: s, k
@@ -102,7 +107,7 @@ contains
     end do
   end function observed
 
-  !> Total energy at the present time, precise enough for an energy balance.
+  !> Total energy at the present time, accurate enough for an energy balance.
   pure function total_energy(sim) result(now)
     type(simulation_t), intent(in) :: sim
     real(real64) :: now                           !! [energy]
@@ -112,7 +117,7 @@ contains
     now = total(sim, sums(:, 0))
   end function total_energy
 
-  !> Adds the observables of an open system, the first of which is the total number of disks.
+  !> Adds the observables of an open system. The first is the total number of disks.
   pure subroutine add_exchange(list, sim)
     type(observable_list_t), intent(inout) :: list
     type(simulation_t), intent(in) :: sim
@@ -127,9 +132,9 @@ contains
     end do
   end subroutine add_exchange
 
-  !> Adds the observables that are averages over the disks of a species; in open systems, averages over no disk are NaN. The
-  !> temperature kT is the mean kinetic energy of a disk relative to the mean velocity and, in a sheared box, to the velocity
-  !> profile.
+  !> Adds averages over the disks of a species. In open systems, averages over no disk are NaN. The
+  !> temperature kT is the mean kinetic energy per disk, relative to the mean velocity and, in a
+  !> sheared box, to the velocity profile.
   pure subroutine add_means(list, group, sums, features)
     type(observable_list_t), intent(inout) :: list
     character(len=*), intent(in) :: group         !! name of the species, or 'all'
@@ -170,7 +175,7 @@ contains
     end associate
   end subroutine add
 
-  !> Components of all observables as a flat array.
+  !> Components of all observables as one array.
   pure function values(self)
     class(observable_list_t), intent(in) :: self
     real(real64) :: values(sum(self%row(:self%n)%width))
@@ -185,7 +190,7 @@ contains
     end do
   end function values
 
-  !> Names in the HDF5 group /observables that are reserved and cannot be names of species.
+  !> Reserved names in the HDF5 group /observables, which species must not have.
   function own_names() result(names)
     character(len=64), allocatable :: names(:)
     type(simulation_t) :: empty
@@ -197,14 +202,14 @@ contains
     call empty%make_room(0)
     call empty%tally%make_room(n_sides)
     empty%box = box_t()
-    empty%box%surface%law%temperature = 1         ! all observables of walls exist if the walls are thermal and move
+    empty%box%surface%law%temperature = 1         ! with thermal, moving walls all their observables exist
     empty%box%surface%law%speed = 1
     empty%features%stress = .true.
     empty%features%helfand = .true.
     empty%features%open = .true.
     list = observed(empty)
     allocate (names(list%n + 2))
-    names(list%n + 1:) = ["obstacles", "sources  "] ! names of groups that exist only if the box has obstacles or sources
+    names(list%n + 1:) = ["obstacles", "sources  "] ! groups that exist only with obstacles or sources
     do k = 1, list%n
       associate (name => list%row(k)%name)
         names(k) = name(:index(name//"/", "/") - 1)
@@ -232,8 +237,9 @@ contains
     if (sim%is_driven()) total = sums(energy) + sums(lost)
   end function total
 
-  !> Adds a term to the energy by compensated summation (Neumaier, ZAMM 54, 39 (1974)). The energy gained from driving can be small
-  !> compared with the total energy of many disks; simple summation would lose some of its digits.
+  !> Adds a term to the energy by compensated summation (Neumaier, ZAMM 54, 39 (1974)). The energy
+  !> gained from driving can be small compared with the total energy of many disks; simple summation
+  !> would lose some of its digits.
   pure subroutine add_energy(sums, term)
     real(real64), intent(inout) :: sums(:)
     real(real64), intent(in) :: term
@@ -248,7 +254,8 @@ contains
     sums(energy) = new
   end subroutine add_energy
 
-  !> Computes all sums in one pass over the disks. The potential energy is zero at the origin of the coordinates.
+  !> Computes all sums in one pass over the disks. The potential energy is zero at the origin of the
+  !> coordinates.
   pure subroutine add_up(sim, sums)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(out) :: sums(:, 0:)
@@ -291,13 +298,15 @@ contains
     end do
   end subroutine add_up
 
-  !> Two-dimensional pressure P by the virial theorem, P A = K + W/(2t): K is the present kinetic energy, A the present accessible
-  !> area, t the time since the start of the run, and W the sum of impulse times distance over all disk-disk collisions since then.
-  !> Between walls, P differs from the mean force per length of a wall, because walls act on the centres of disks at the distance of
-  !> a radius.
+  !> Two-dimensional pressure P by the virial theorem, P A = K + W/(2t), where K is the present
+  !> kinetic energy, A the present accessible area, t the time since the start of the run, and W the
+  !> sum of impulse times distance over all disk-disk collisions since then. Between walls, P
+  !> differs from the mean force per length of a wall, because walls act on the centres of disks at
+  !> the distance of one radius.
   pure function pressure(sim, kinetic)
     type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: kinetic           !! kinetic energy relative to the velocity profile of a sheared box [energy]
+    !> Kinetic energy relative to the velocity profile of a sheared box [energy].
+    real(real64), intent(in) :: kinetic
     real(real64) :: pressure
     type(box_t) :: box
 

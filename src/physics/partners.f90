@@ -1,7 +1,7 @@
 !> Integer codes for the partner of a disk in an event:
 !> - a disk (> 0);
 !> - a surface of the box: 0, -1, -2, -3 for the left, right, bottom and top side; -4, -5, ... for
-!>   obstacles (these are the boundary ids; side k has the code 1 - k, the m-th obstacle -3 - m);
+!>   obstacles. These are the boundary ids: side k has the code 1 - k, obstacle m the code -3 - m;
 !> - the boundary of the cell of the disk (large negative codes).
 !>
 !> The event log uses the same boundary ids, but identifies disks by their ids instead of their
@@ -24,7 +24,7 @@ module partners
 
 contains
 
-  !> Whether a code <= 0 represents a side of the box.
+  !> True if a code <= 0 represents a side of the box.
   elemental function is_side(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -32,7 +32,7 @@ contains
     yes = code > -n_sides
   end function is_side
 
-  !> Whether a code <= 0 represents a side or an obstacle, and not the boundary of a cell.
+  !> True if a code <= 0 represents a side or an obstacle, and not the boundary of a cell.
   elemental function is_wall(code) result(yes)
     integer(int32), intent(in) :: code
     logical :: yes
@@ -40,7 +40,7 @@ contains
     yes = code > first_crossing
   end function is_wall
 
-  !> The code of the m-th obstacle.
+  !> Code of obstacle m.
   elemental function obstacle_code(m) result(code)
     integer(int32), intent(in) :: m
     integer(int32) :: code
@@ -48,7 +48,7 @@ contains
     code = 1 - n_sides - m
   end function obstacle_code
 
-  !> The index of the obstacle with the given code.
+  !> Index of the obstacle with the given code.
   elemental function obstacle_number(code) result(m)
     integer(int32), intent(in) :: code
     integer(int32) :: m
@@ -56,7 +56,7 @@ contains
     m = 1 - n_sides - code
   end function obstacle_number
 
-  !> The index of the axis that is normal to a side.
+  !> Index of the axis normal to a side.
   elemental function axis_of(side) result(axis)
     integer(int32), intent(in) :: side
     integer(int32) :: axis
@@ -73,8 +73,8 @@ contains
     sense = 2*modulo(side, 2) - 1
   end function sense_of
 
-  !> Code of the event in which a disk leaves its cell through the face on the given side (left,
-  !> right, bottom or top).
+  !> Code of the event when a disk leaves its cell through the face on the given side (left, right,
+  !> bottom or top).
   elemental function crossing(side) result(code)
     integer(int32), intent(in) :: side
     integer(int32) :: code
@@ -82,7 +82,7 @@ contains
     code = first_crossing + side
   end function crossing
 
-  !> Side through which a disk leaves its cell, given the code of the event (see `crossing`).
+  !> Side through which a disk leaves its cell, from the code of the event (see `crossing`).
   elemental function side_crossed(code) result(side)
     integer(int32), intent(in) :: code
     integer(int32) :: side

@@ -16,11 +16,13 @@ module sample_values
     integer :: width = 1
     logical :: is_count = .false.                 !! whether the values are integers
     character(len=80) :: meaning = ""             !! for `--explain`; a drive describes its own column
-    character(len=80) :: needs = ""               !! what a run needs for this column, for messages
+    character(len=80) :: needs = ""               !! requirement of this column, for messages
   end type frame_column_t
 
-  character(len=*), parameter :: the_count = ""   !! placeholder for the name of `drive_count`, which depends on the driving
-  !> All columns, in the order of the conditions in `has_columns` and of the cases in `frame_sample`.
+  !> Placeholder for the name of `drive_count`, which depends on the driving.
+  character(len=*), parameter :: the_count = ""
+  !> All columns, in the order of the conditions in `has_columns` and of the cases in
+  !> `frame_sample`.
   type(frame_column_t), parameter :: all_columns(*) = [ &
     frame_column_t("position", 2, meaning="Positions of the disks."), &
     frame_column_t("velocity", 2, meaning="Velocities of the disks."), &
@@ -40,7 +42,7 @@ module sample_values
 
 contains
 
-  !> Which of `all_columns` are available in frames of a system.
+  !> True for each of `all_columns` that is available in frames of a system.
   pure function has_columns(system) result(yes)
     class(system_t), intent(in) :: system
     logical :: yes(size(all_columns))
@@ -49,10 +51,11 @@ contains
       system%features%orientation, system%kick_counter() /= ""]
   end function has_columns
 
-  !> Columns of the frames of a system: the positions, and the columns named in `wanted`; by default, all that are available.
+  !> Columns of the frames of a system: the positions, and the columns in `wanted`; by default, all
+  !> available columns.
   pure function frame_columns(system, wanted) result(list)
     class(system_t), intent(in) :: system
-    character(len=*), intent(in), optional :: wanted(:)   !! names of the wanted columns
+    character(len=*), intent(in), optional :: wanted(:)   !! names of the requested columns
     type(frame_column_t), allocatable :: list(:)
     integer :: k
 
@@ -62,7 +65,8 @@ contains
     if (present(wanted)) list = pack(list, [.true., (any(wanted == list(k)%name), k=2, size(list))])
   end function frame_columns
 
-  !> The present frame, with disks in the order of the input. Positions and velocities of waiting disks are NaN.
+  !> The present frame, with disks in the order of the input. Positions and velocities of waiting
+  !> disks are NaN.
   function frame_sample(sim, step, list) result(sample)
     type(simulation_t), intent(in) :: sim
     integer(int64), intent(in) :: step            !! number of the frame, counted from 0
@@ -70,10 +74,10 @@ contains
     type(sample_t) :: sample
     logical :: shared, inside
     real(real64) :: x(2), v(2), image(2)
-    real(real64) :: absent                        ! NaN, in place of the values of disks that wait outside of the box
+    real(real64) :: absent                        ! NaN, for disks outside the box
     integer(int32) :: i, k, n
-    integer :: n_integers                         ! per disk
-    integer :: at(size(all_columns))              ! place of disk 1 in each column; 0 for columns that the frame lacks
+    integer :: n_integers                         ! number of integers per disk
+    integer :: at(size(all_columns))              ! index of disk 1 in each column; 0 for missing columns
 
     n = sim%n_disks()
     n_integers = sum(list%width, list%is_count)
@@ -111,7 +115,8 @@ contains
     end associate
   end function frame_sample
 
-  !> Index of the first value of each of `all_columns` among the reals or the integers of a frame; 0 for columns not in the frame.
+  !> Index of the first value of each of `all_columns` among the reals or the integers of a frame; 0
+  !> for columns not in the frame.
   pure function places(list, n) result(at)
     type(frame_column_t), intent(in) :: list(:)   !! columns of the frame
     integer(int32), intent(in) :: n               !! number of disks
@@ -119,7 +124,7 @@ contains
     integer :: c, column
 
     at = 0
-    first = 1 + first_values(n*list%width, list%is_count)    ! behind step and time
+    first = 1 + first_values(n*list%width, list%is_count)    ! after step and time
     do c = 1, size(list)
       column = findloc(all_columns%name, list(c)%name, dim=1)
       if (column == 0) column = findloc(all_columns%name, the_count, dim=1)
@@ -127,8 +132,9 @@ contains
     end do
   end function places
 
-  !> Moves a disk by whole periods into the box and counts the periods. Points on the left and lower side belong to the box, points
-  !> on the right and upper side do not. Shifts along y come first, because in a sheared box they also change x.
+  !> Moves a disk by whole periods into the box and counts the periods. Points on the left and lower
+  !> side belong to the box; points on the right and upper side do not. Shifts along y come first,
+  !> because in a sheared box they also change x.
   pure subroutine wrap(sim, x, v, image)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(inout) :: x(2)           !! [length]
@@ -148,7 +154,7 @@ contains
           x(1) = x(1) - periods*(upper - lower)
           image(1) = image(1) + periods
         end if
-        x(axis) = max(x(axis), lower)             ! a rounding error may have moved the position out of the box
+        x(axis) = max(x(axis), lower)      ! a rounding error may have moved the position out of the box
       end associate
     end do
   end subroutine wrap

@@ -1,5 +1,5 @@
-!> The complete state of a simulation. Checkpoints store all of it except values given by the input and data marked as derived in
-!> `disks`.
+!> The complete state of a simulation. Checkpoints store all of it, except values given by the input
+!> and data marked as derived in `disks`.
 module simulation_state
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: box_t
@@ -15,12 +15,13 @@ module simulation_state
   private
   public :: change_t, drive_t, specification_t, simulation_t, system_t
 
-  !> Driving: kicks at all multiples of a time interval, which change velocities or positions of disks. Each kind of driving extends
-  !> this type in a file of the folder `drives`. The abstract type is defined here because the definitions depend on each other: a
-  !> kick changes a simulation, and a simulation contains its driving.
+  !> Driving: kicks at multiples of a time interval, which change velocities or positions of disks.
+  !> Each kind of driving extends this type in a file of the folder `drives`. The abstract type is
+  !> defined here because the definitions depend on each other: a kick changes a simulation, and a
+  !> simulation contains its driving.
   type, abstract :: drive_t
     real(real64) :: interval = never              !! time between kicks [time]
-    integer :: species = 0                        !! index of the only driven species; 0: all species are driven
+    integer :: species = 0                        !! index of the only driven species; 0 for all species
   contains
     procedure(read_drive), deferred :: read
     procedure(kick), deferred :: kick
@@ -36,12 +37,13 @@ module simulation_state
     procedure :: counter
   end type drive_t
 
-  !> The system: box, contact law, driving and features, which together determine the motion of the disks.
+  !> The system: box, contact law, driving and features, which together determine the motion of the
+  !> disks.
   type :: system_t
     type(box_t) :: box
     type(contact_law_t) :: law
-    class(drive_t), allocatable :: drive          !! not allocated if the disks are not driven
-    type(source_t), allocatable :: source(:)      !! sources, in the order of the file; not allocated if there are none
+    class(drive_t), allocatable :: drive          !! not allocated without driving
+    type(source_t), allocatable :: source(:)      !! in the order of the file; not allocated without sources
     type(features_t) :: features                  !! optional features
   contains
     procedure :: kick_time
@@ -49,10 +51,10 @@ module simulation_state
     procedure :: has_extra
   end type system_t
 
-  !> A change of the system at a time known beforehand.
+  !> A change of the system at a time known in advance.
   type :: change_t
     real(real64) :: time = never                  !! [time]
-    type(system_t) :: system                      !! system after the change, without the obstacles, which do not change
+    type(system_t) :: system      !! system after the change, without the obstacles, which stay the same
     logical :: is_empty = .false.                 !! whether no value changes, so that nothing happens
     character(len=:), allocatable :: name
     character(len=:), allocatable :: origin       !! file, line and name of the change, for messages
@@ -62,43 +64,48 @@ module simulation_state
   !> Values given by the input, identical in all domains of a simulation.
   type, extends(system_t) :: specification_t
     type(species_t), allocatable :: species(:)
-    integer(int64) :: seed = 1                    !! seed of random numbers drawn during the run
+    integer(int64) :: seed = 1                    !! seed of the random numbers during the run
   end type specification_t
 
-  !> A simulation: values given by the input, and the state that a checkpoint stores.
+  !> A simulation: values given by the input, and the state stored in a checkpoint.
   type, extends(specification_t) :: simulation_t
-    type(disk_t), allocatable :: disk(:)          !! (n) disks, sorted by cells; their numbers in the input are in `tag%id`
-    type(tag_t), allocatable :: tag(:)            !! (n)
-    real(real64), allocatable :: own_mass(:)      !! (n) individual masses, allocated if masses within a species differ [mass]
-    type(extra_t), allocatable :: extra(:)        !! (n) optional data, allocated if `has_extra`
-    !> (n) Series of simultaneous collisions, in the order of ids; allocated if a collapse is possible.
+    type(disk_t), allocatable :: disk(:)         !! disks, sorted by cells
+    type(tag_t), allocatable :: tag(:)           !! tags of the disks; `id` is the number in the input
+    real(real64), allocatable :: own_mass(:)     !! allocated if masses within a species differ [mass]
+    type(extra_t), allocatable :: extra(:)        !! optional data, allocated if `has_extra`
+    !> Series of simultaneous collisions, in the order of ids; allocated if a collapse is possible.
     type(series_t), allocatable :: series(:)
-    !> (n) Number of times that the driving has acted on each disk, in the order of ids; allocated if the driving has a `counter`.
+    !> Number of actions of the driving on each disk, in the order of ids; allocated if the driving
+    !> has a `counter`.
     integer(int64), allocatable :: drive_count(:)
-    real(real64) :: now = 0.0_real64              !! present time, relative to the time origin `box%epoch` [time]
-    logical :: events_done = .false.              !! whether all events up to and including the time `now` have been executed
-    real(real64) :: epoch_begin = 0.0_real64      !! start of the epoch, relative to the time origin `box%epoch` [time]
-    real(real64) :: epoch_end = 0.0_real64        !! end of the epoch, relative to `box%epoch`; 0 if not known yet [time]
-    integer(int64) :: epoch_events = 0            !! number of events from the start of the run to the start of the epoch
-    ! The next three components serve to detect that time no longer advances.
-    real(real64) :: negligible_time = 0.0_real64  !! duration in which no disk moves noticeably; 0 if not known yet [time]
-    !> Time at which the simulation last advanced by more than `negligible_time`, relative to the time origin `box%epoch` [time]
+    real(real64) :: now = 0.0_real64      !! present time, relative to the time origin `box%epoch` [time]
+    logical :: events_done = .false.      !! whether all events up to and including `now` have been executed
+    real(real64) :: epoch_begin = 0.0_real64     !! start of the epoch, relative to `box%epoch` [time]
+    real(real64) :: epoch_end = 0.0_real64       !! end of the epoch; 0 if not known yet [time]
+    integer(int64) :: epoch_events = 0            !! number of events before the start of the epoch
+    ! The next three components are used to detect that time no longer advances.
+    !> Duration in which no disk moves noticeably; 0 if not known yet [time].
+    real(real64) :: negligible_time = 0.0_real64
+    !> Time of the last advance by more than `negligible_time`, relative to `box%epoch` [time].
     real(real64) :: last_advance = 0.0_real64
-    integer(int64) :: events_then = 0             !! number of events that had been executed at the time `last_advance`
-    !> (n) Whether each disk waits outside the box, in the order of ids; allocated in open systems. Waiting disks have no events and
-    !> zero velocity.
+    integer(int64) :: events_then = 0             !! number of events before the time `last_advance`
+    !> Whether each disk waits outside the box, in the order of ids; allocated in open systems.
+    !> Waiting disks have no events and zero velocity.
     logical, allocatable :: waits(:)
-    !> (sources) Time up to which entries have been made, since the start of the run; allocated together with `waits` [time]
+    !> Time up to which each source has let disks enter, since the start of the run; allocated
+    !> together with `waits` [time].
     real(real64), allocatable :: source_time(:)
     integer(int64) :: kicks = 0                   !! number of kicks since the start of the run
-    integer(int64) :: changes = 0                 !! number of changes since the start of the run: see `changes`
-    type(change_t), allocatable :: schedule(:)    !! scheduled changes in the order of their times, including those already made
-    integer(int64) :: changes_made = 0            !! number of scheduled changes already made
+    integer(int64) :: changes = 0      !! number of changes since the start of the run; see `changes`
+    type(change_t), allocatable :: schedule(:)   !! scheduled changes, including those made
+    integer(int64) :: changes_made = 0            !! number of scheduled changes made
     type(tally_t) :: tally                        !! counters and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start of the run [energy]
-    !> Kinetic energy when the velocities were last set: at the start of the run or by a change [energy]
+    !> Kinetic energy when the velocities were last set, at the start of the run or by a change
+    !> [energy].
     real(real64) :: reference_energy = 0.0_real64
-    real(real64) :: typical_speed2 = 0.0_real64   !! largest mean square speed at the start and after changes [(length/time)**2]
+    !> Maximum mean square speed at the start and after changes [(length/time)**2].
+    real(real64) :: typical_speed2 = 0.0_real64
   contains
     procedure :: time
     procedure :: has_reached
@@ -134,7 +141,7 @@ module simulation_state
 
   abstract interface
 
-    !> Reads the variables of a kind of driving from the group `&drive`.
+    !> Reads the variables of the driving from the group `&drive`.
     subroutine read_drive(self, fields)
       import :: drive_t, fields_t
       class(drive_t), intent(inout) :: self
@@ -149,7 +156,7 @@ module simulation_state
       integer(int32), allocatable, intent(out) :: kicked(:)
     end subroutine kick
 
-    !> Mean square of the velocity that a kick sets or adds, for driven disks of a given mass.
+    !> Mean square of the velocities set or added by a kick, for driven disks of a given mass.
     pure function mean_square(self, mass) result(speed2)
       import :: drive_t, real64
       class(drive_t), intent(in) :: self
@@ -181,7 +188,7 @@ module simulation_state
 
 contains
 
-  !> Whether the driving acts on a species.
+  !> True if the driving acts on a species.
   elemental function acts_on(self, species) result(yes)
     class(drive_t), intent(in) :: self
     integer, intent(in) :: species                !! index of the species
@@ -190,7 +197,7 @@ contains
     yes = self%species == 0 .or. self%species == species
   end function acts_on
 
-  !> Whether each kick changes the velocities of all disks and moves no disk.
+  !> True if each kick changes the velocities of all disks and moves no disk.
   pure function acts_on_all(self) result(yes)
     class(drive_t), intent(in) :: self
     logical :: yes
@@ -198,7 +205,8 @@ contains
     yes = self%species == 0
   end function acts_on_all
 
-  !> Checks whether the driving is compatible with the box and the disks. Problems are attributed to variables of `&drive`.
+  !> Checks that the driving is compatible with the box and the disks. Problems are reported for
+  !> variables of `&drive`.
   subroutine check(self, fields, box, count, radius)
     class(drive_t), intent(in) :: self
     class(fields_t), intent(inout) :: fields
@@ -222,7 +230,7 @@ contains
     type(simulation_t), intent(inout) :: sim
   end subroutine prepare
 
-  !> Whether driven disks have an orientation even if they do not rotate.
+  !> True if driven disks have an orientation even if they do not rotate.
   pure function orients_disks(self) result(yes)
     class(drive_t), intent(in) :: self
     logical :: yes
@@ -230,7 +238,7 @@ contains
     yes = .false.
   end function orients_disks
 
-  !> Whether kicks also move disks to other positions.
+  !> True if kicks also move disks to other positions.
   pure function moves_disks(self) result(yes)
     class(drive_t), intent(in) :: self
     logical :: yes
@@ -238,7 +246,7 @@ contains
     yes = .false.
   end function moves_disks
 
-  !> Whether a kick can change the state even after the last possible event.
+  !> True if a kick can change the state even when no further event can occur.
   pure function can_act(self, sim) result(yes)
     class(drive_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -247,7 +255,8 @@ contains
     yes = .true.
   end function can_act
 
-  !> Name of the number stored in `drive_count` for each disk, in frames and observables; empty for driving without such a number.
+  !> Name of the number `drive_count` of each disk in frames and observables; empty for driving
+  !> without a counter.
   pure function counter(self) result(name)
     class(drive_t), intent(in) :: self
     character(len=:), allocatable :: name
@@ -255,12 +264,12 @@ contains
     name = ""
   end function counter
 
-  !> Time of the k-th kick; `never` without driving. It is k times the interval, because repeated addition would accumulate rounding
-  !> errors.
+  !> Time of kick k; `never` without driving. It is k times the interval, because repeated addition
+  !> would accumulate rounding errors.
   pure function kick_time(self, k) result(t)
     class(system_t), intent(in) :: self
     integer(int64), intent(in) :: k
-    real(real64) :: t                             !! time since the start of the run [time]
+    real(real64) :: t                             !! since the start of the run [time]
 
     t = never
     if (allocated(self%drive)) t = k*self%drive%interval
@@ -283,10 +292,11 @@ contains
     t = self%box%epoch + self%now
   end function time
 
-  !> Whether a time has been reached and all events at this time have been executed. A run can stop between simultaneous events.
+  !> True if a time was reached and all events at this time have been executed. A run can stop
+  !> between simultaneous events.
   pure function has_reached(self, t) result(yes)
     class(simulation_t), intent(in) :: self
-    real(real64), intent(in) :: t                 !! time since the start of the run [time]
+    real(real64), intent(in) :: t                 !! since the start of the run [time]
     logical :: yes
 
     yes = self%events_done .and. self%time() >= t
@@ -300,7 +310,8 @@ contains
     n = size(self%disk, kind=int32)
   end function n_disks
 
-  !> Allocates the disks of all species in the order of the input. Individual masses are set later by the caller.
+  !> Allocates the disks of all species in the order of the input. The caller sets individual masses
+  !> later.
   pure subroutine list_disks(self)
     class(simulation_t), intent(inout) :: self    !! on entry, a simulation with all values given by the input
     integer(int32) :: i
@@ -314,7 +325,7 @@ contains
     end do
   end subroutine list_disks
 
-  !> Whether the disks have the optional data of `extra_t`.
+  !> True if the disks have the optional data of `extra_t`.
   pure function has_extra(self) result(yes)
     class(system_t), intent(in) :: self
     logical :: yes
@@ -322,7 +333,7 @@ contains
     yes = any(self%box%periodic) .or. self%law%contact_time > 0 .or. self%features%rotation .or. self%features%orientation
   end function has_extra
 
-  !> Whether an inelastic collapse has occurred.
+  !> True if an inelastic collapse has occurred.
   pure function has_collapsed(self) result(yes)
     class(simulation_t), intent(in) :: self
     logical :: yes
@@ -331,7 +342,8 @@ contains
     if (yes) yes = self%tally%collapse <= self%time()
   end function has_collapsed
 
-  !> Allocates the series of simultaneous collisions if a collapse is possible, and deallocates them otherwise.
+  !> Allocates the series of simultaneous collisions if a collapse is possible, and deallocates them
+  !> otherwise.
   pure subroutine fit_series(self)
     class(simulation_t), intent(inout) :: self
 
@@ -343,7 +355,7 @@ contains
     end if
   end subroutine fit_series
 
-  !> Allocates the data of an open system, with all disks in the box, unless the data already exist.
+  !> Allocates the data of an open system, with all disks in the box, unless the data exist already.
   pure subroutine open_up(self)
     class(simulation_t), intent(inout) :: self
     integer :: n_sources
@@ -357,7 +369,7 @@ contains
     allocate (self%tally%entered(n_sources), source=0_int64)
   end subroutine open_up
 
-  !> Whether disk i is in the box.
+  !> True if disk i is in the box.
   pure function is_inside(self, i) result(yes)
     class(simulation_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -440,8 +452,8 @@ contains
     mass = [(self%mass_of(i), i=1, self%n_disks())]
   end function masses
 
-  !> Sets the mass of each species to that of its heaviest disk, and deallocates the array of individual masses if the masses are
-  !> equal within each species.
+  !> Sets the mass of each species to that of its heaviest disk, and deallocates the individual
+  !> masses if they are equal within each species.
   pure subroutine simplify_masses(self)
     class(simulation_t), intent(inout) :: self
     logical :: equal
@@ -466,7 +478,7 @@ contains
     images = self%box%images(self%box%epoch)
   end function images_now
 
-  !> Position of disk i at the present time, without changing its stored state.
+  !> Position of disk i at the present time. The stored state does not change.
   pure function position(self, i) result(x)
     class(simulation_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -507,8 +519,8 @@ contains
     self%extra(i)%spin = self%extra(i)%spin + change/self%inertia_of(i)
   end subroutine change_angular_momentum
 
-  !> Advances the orientation of disk i to the time t. Must be called before `disks: advance_disk`, which changes the clock of the
-  !> disk.
+  !> Advances the orientation of disk i to the time t. Must be called before `disks: advance_disk`,
+  !> which changes the clock.
   pure subroutine rotate_to(self, i, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -517,12 +529,13 @@ contains
     if (self%features%rotation) self%extra(i)%angle = self%extra(i)%angle + self%extra(i)%spin*(t - self%disk(i)%clock)
   end subroutine rotate_to
 
-  !> Registers a contact of disk i at the time t. `elastic` becomes .true. if its previous contact has not ended yet (TC model).
+  !> Registers a contact of disk i at the time t. `elastic` is set to .true. if the previous contact
+  !> has not ended yet (TC model).
   pure subroutine register_contact(self, i, t, elastic)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
-    logical, intent(inout) :: elastic             !! on entry, whether the collision is already known to be elastic
+    logical, intent(inout) :: elastic      !! on entry, whether the collision is elastic for another reason
 
     associate (last => self%extra(i)%last_contact)
       elastic = elastic .or. (self%tag(i)%collisions > 0 .and. t - last < self%law%contact_time)
@@ -530,14 +543,14 @@ contains
     end associate
   end subroutine register_contact
 
-  !> Updates the sums of the flux changes after a change of the velocity of disk i at the time t. The time integral of a flux is the
-  !> present flux times the present time, minus the sum over all its changes, each multiplied by its time. This expression is exact
-  !> at any time.
+  !> Updates the sums of flux changes after a change of the velocity of disk i at the time t. The
+  !> time integral of a flux is the present flux times the present time, minus the sum over all its
+  !> changes, each multiplied by its time. This expression is exact at any time.
   pure subroutine record_velocity_change(self, i, before, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: before(2)         !! velocity of disk i before the change [length/time]
-    real(real64), intent(in) :: t                 !! time relative to the time origin `box%epoch` [time]
+    real(real64), intent(in) :: t                 !! relative to the time origin `box%epoch` [time]
 
     if (.not. self%features%helfand) return
     associate (mass => self%mass_of(i), sums => self%tally%sum(flux_changes:flux_changes + 4))
@@ -572,7 +585,7 @@ contains
     end do
   end function kinetic_energy
 
-  !> Whether disks can gain unlimited energy, and therefore unlimited speed, from walls or driving.
+  !> True if disks can gain unlimited energy, and therefore unlimited speed, from walls or driving.
   pure function is_driven(self) result(yes)
     class(simulation_t), intent(in) :: self
     logical :: yes

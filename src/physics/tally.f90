@@ -1,5 +1,5 @@
-!> Counters and sums over all collisions since the start of the run. The sums are exact: they depend neither on the order of the
-!> terms nor on the domains in which they were added.
+!> Counters and sums over all collisions since the start of the run. The sums are exact: they depend
+!> neither on the order of their terms nor on the domains in which the terms were added.
 module tally
   use exact_sums, only: exact_sum_t
   use kinds, only: int32, int64, never, real64
@@ -8,8 +8,8 @@ module tally
   private
   public :: kinetic_flux, tally_t
 
-  !> Kinds of terms, by physical dimension. The unit of a sum depends on the kind of its terms (see `simulation_state:
-  !> choose_units`).
+  !> Kinds of terms, by physical dimension. The unit of a sum depends on the kind of its terms (see
+  !> `simulation_state: choose_units`).
   integer, parameter, public :: energies = 1, impulses = 2, virials = 3, energy_transfers = 4, momentum_transfers = 5
 
   type :: sum_t
@@ -17,12 +17,13 @@ module tally
     integer :: kind                                !! kind of the terms of the sum, such as `energies`
   end type sum_t
 
-  !> Positions of the sums over collisions in the list `sums`, which determines their units and their order in checkpoints and in
-  !> the exchange between domains.
+  !> Indices of the sums over collisions in the list `sums`, which determines their units and their
+  !> order in checkpoints and in the exchange between domains.
   integer, parameter, public :: virial = 1, dissipated = 2, heat = 3, work = 4, drive_energy = 5, stress = 6
-  integer, parameter, public :: heat_virial = 10, flux_changes = 12  ! stress has four components, heat_virial two
+  ! stress has four components, heat_virial two
+  integer, parameter, public :: heat_virial = 10, flux_changes = 12
   type(sum_t), parameter :: sums(*) = [ &
-    sum_t("virial", virials), &                    ! sum of impulse times distance over collisions of disks [energy time]
+    sum_t("virial", virials), &      ! impulse times distance in disk-disk collisions [energy time]
     sum_t("dissipated", energies), &               ! dissipated kinetic energy [energy]
     sum_t("heat", energies), &                     ! energy transferred to disks by thermal walls [energy]
     sum_t("work", energies), &                     ! work done on disks by moving boundaries [energy]
@@ -31,42 +32,47 @@ module tally
     sum_t("stress_xx", virials), sum_t("stress_xy", virials), sum_t("stress_yx", virials), sum_t("stress_yy", virials), &
     ! Sums over disk-disk collisions of energy transfer times distance [energy length].
     sum_t("heat_virial_x", energy_transfers), sum_t("heat_virial_y", energy_transfers), &
-    ! Sums over all changes of `kinetic_flux`: change of the flux times the time of the change [energy time], [energy length].
+    ! Sums over all changes of `kinetic_flux`: change of the flux times the time of the change
+    ! [energy time], [energy length].
     sum_t("flux_xx", momentum_transfers), sum_t("flux_xy", momentum_transfers), sum_t("flux_yy", momentum_transfers), &
     sum_t("flux_x", energy_transfers), sum_t("flux_y", energy_transfers)]
 
-  !> Sums for each surface of the box: the impulse on it [mass length/time], and the energy gained by disks colliding with it
-  !> [energy].
+  !> Sums for each surface of the box: the impulse on the surface [mass length/time], and the energy
+  !> gained by disks in collisions with it [energy].
   integer, parameter, public :: impulse = 1, gain = 3
 
-  !> Positions of the energies of departing and entering disks in `flow`.
+  !> Indices of the energies of departing and entering disks in `flow`.
   integer, parameter, public :: outflow = 1, inflow = 2
 
-  !> Largest number of simultaneous collisions in a finite series, divided by the square of the number of disks. It applies if the
-  !> coefficient of restitution is at least 3 % above the value below which a row of disks collapses. The largest value found is
-  !> 9.7, in rows of up to 12 equal touching disks, free or at a wall.
+  !> Maximum number of simultaneous collisions in a finite series, divided by the square of the
+  !> number of disks. It applies if the coefficient of restitution is at least 3 % above the value
+  !> below which a row of disks collapses. The largest value found is 9.7, in rows of up to 12 equal
+  !> touching disks, free or at a wall.
   integer(int64), parameter :: longest_finite = 10
 
   type :: tally_t
     integer(int64) :: events = 0                   !! number of events
-    integer(int64) :: collisions = 0               !! number of collisions of disks
-    !> Number of collisions in which both disks had already collided at exactly that time (see
-    !> `collapses`).
+    integer(int64) :: collisions = 0               !! number of disk-disk collisions
+    !> Number of collisions of two disks that had both already collided at exactly the same time
+    !> (see `collapses`).
     integer(int64) :: simultaneous = 0
-    !> Number of collisions and number of disks in the longest of the series that have more collisions
-    !> than `longest_finite` allows; 0 if there is none
+    !> Numbers of collisions and of disks in the longest series with more collisions than
+    !> `longest_finite` allows; 0 if there is none.
     integer(int64) :: series(2) = 0
-    !> Time of the first inelastic collapse, since the start of the run; known shortly before [time]
+    !> Time of the first inelastic collapse since the start of the run, known shortly before the
+    !> collapse [time].
     real(real64) :: collapse = never
-    integer(int64) :: unexamined = 0               !! number of collisions in a domain that only the serial engine can examine
+    !> Number of collisions in a domain that only the serial engine can examine.
+    integer(int64) :: unexamined = 0
     type(exact_sum_t) :: sum(size(sums))
-    integer(int64), allocatable :: surface_collisions(:)  !! (surfaces) number of collisions with each surface
-    type(exact_sum_t), allocatable :: surface_sums(:, :)   !! (3,surfaces) impulse along x and y, and energy gained by disks
+    integer(int64), allocatable :: surface_collisions(:)  !! number of collisions with each surface
+    !> Impulse along x and y, and energy gained by disks, for each surface; shape (3, surfaces).
+    type(exact_sum_t), allocatable :: surface_sums(:, :)
     ! Components of open systems.
-    integer(int64), allocatable :: inside(:)       !! (species) number of disks in the box
-    integer(int64), allocatable :: entered(:)      !! (sources) number of disks that have entered
-    integer(int64) :: left(n_sides) = 0            !! number of disks that have left through each side
-    type(exact_sum_t) :: flow(inflow)              !! energy of the disks that have left and entered [energy]
+    integer(int64), allocatable :: inside(:)       !! number of disks of each species in the box
+    integer(int64), allocatable :: entered(:)      !! number of disks that entered through each source
+    integer(int64) :: left(n_sides) = 0            !! number of disks that left through each side
+    type(exact_sum_t) :: flow(inflow)              !! energy of the disks that left and entered [energy]
   contains
     procedure :: make_room
     procedure :: has_at_most
@@ -79,7 +85,7 @@ module tally
 
 contains
 
-  !> Allocates the sums for n surfaces, unless the sums are already allocated.
+  !> Allocates the sums for n surfaces, unless they are already allocated.
   pure subroutine make_room(self, n)
     class(tally_t), intent(inout) :: self
     integer, intent(in) :: n
@@ -89,7 +95,7 @@ contains
     allocate (self%surface_sums(gain, n))
   end subroutine make_room
 
-  !> Whether at most n disks are in the box after at least one disk has left it.
+  !> True if at most n disks are in the box after at least one disk has left it.
   pure function has_at_most(self, n) result(yes)
     class(tally_t), intent(in) :: self
     integer(int64), intent(in) :: n
@@ -99,8 +105,8 @@ contains
     if (yes) yes = sum(self%inside) <= n
   end function has_at_most
 
-  !> Chooses the units of the sums. All sums of one kind have the same unit, which depends on a bound for their terms (see
-  !> `exact_sums: choose_unit`).
+  !> Chooses the units of the sums. All sums of one kind have the same unit, which depends on a
+  !> bound for their terms (see `exact_sums: choose_unit`).
   pure subroutine choose_units(self, bound)
     class(tally_t), intent(inout) :: self
     real(real64), intent(in) :: bound(:)           !! bound for the terms of each kind
@@ -111,9 +117,9 @@ contains
     call self%flow%choose_unit(bound(energies))
   end subroutine choose_units
 
-  !> Fluxes of a disk in free flight: the components xx, xy and yy of the momentum flux [energy], and the components x and y of the
-  !> kinetic energy flux [energy length/time]. Their time integrals are the kinetic parts of the Helfand moments (Physical Review
-  !> 119, 1 (1960)).
+  !> Fluxes of a disk in free flight: the components xx, xy and yy of the momentum flux [energy],
+  !> and the components x and y of the kinetic energy flux [energy length/time]. Their time
+  !> integrals are the kinetic parts of the Helfand moments (Physical Review 119, 1 (1960)).
   pure function kinetic_flux(mass, v)
     real(real64), intent(in) :: mass
     real(real64), intent(in) :: v(2)               !! [length/time]
@@ -122,7 +128,7 @@ contains
     kinetic_flux = mass*[v(1)*v(1), v(1)*v(2), v(2)*v(2), 0.5_real64*dot_product(v, v)*v]
   end function kinetic_flux
 
-  !> The value of the k-th sum.
+  !> Value of sum k.
   elemental function total(self, k)
     class(tally_t), intent(in) :: self
     integer, intent(in) :: k                       !! index in `sums`
@@ -131,8 +137,8 @@ contains
     total = self%sum(k)%value()
   end function total
 
-  !> Records the numbers of collisions and disks of a series of simultaneous collisions, if the series is the longest so far and
-  !> longer than any finite series that occurs in a row of as many equal disks.
+  !> Records the numbers of collisions and disks of a series of simultaneous collisions, if it is
+  !> the longest series so far and longer than any finite series in a row of as many equal disks.
   pure subroutine note_series(self, collisions, disks)
     class(tally_t), intent(inout) :: self
     integer(int64), intent(in) :: collisions
@@ -141,8 +147,8 @@ contains
     if (collisions > max(longest_finite*int(disks, int64)**2, self%series(1))) self%series = [collisions, int(disks, int64)]
   end subroutine note_series
 
-  !> Adds the counters and sums of another tally with the same units: that of a domain, in which series of simultaneous collisions
-  !> are not examined.
+  !> Adds the counters and sums of another tally with the same units: that of a domain, in which
+  !> series of simultaneous collisions are not examined.
   pure subroutine include(self, other)
     class(tally_t), intent(inout) :: self
     type(tally_t), intent(in) :: other
@@ -154,7 +160,7 @@ contains
     call self%surface_sums%include(other%surface_sums)
   end subroutine include
 
-  !> Sets all counters and sums to zero, without changing the units of the sums.
+  !> Sets all counters and sums to zero. The units of the sums do not change.
   pure subroutine clear(self)
     class(tally_t), intent(inout) :: self
 

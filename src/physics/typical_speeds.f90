@@ -1,18 +1,20 @@
-!> Typical speeds of the disks, and the units of the sums over collisions, which depend on these speeds.
+!> Typical speeds of the disks, and the units of the sums over collisions, which depend on these
+!> speeds.
 submodule(simulation_state) typical_speeds
   implicit none
 
-  !> Factors in the bound for the terms of an exact sum, which determines the unit of the sum (see `exact_sums: choose_unit`). The
-  !> bound is `common` times a typical term of the heaviest disks or `rare` times a typical term of the lightest disks, whichever is
-  !> smaller.
+  !> Factors in the bound for the terms of an exact sum, which determines the unit of the sum (see
+  !> `exact_sums: choose_unit`). The bound is `common` times a typical term of the heaviest disks or
+  !> `rare` times a typical term of the lightest disks, whichever is smaller.
   real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
-  !> Reduction of the units of the exact sums in driven simulations. The work of walls and kicks may be far smaller than estimated
-  !> from their parameters; the smaller units still resolve it.
+  !> Reduction of the units of the exact sums in driven simulations. The work of walls and kicks may
+  !> be far smaller than estimated from their parameters; the smaller units still resolve it.
   real(real64), parameter :: finer = 2.0_real64**(-30)
 
 contains
 
-  !> Records the initial energy and chooses the units of the sums, unless an earlier call has done so.
+  !> Records the initial energy and chooses the units of the sums, if this has not been done by an
+  !> earlier call.
   pure module subroutine start_sums(self)
     class(simulation_t), intent(inout) :: self
 
@@ -23,7 +25,8 @@ contains
     call self%choose_units()
   end subroutine start_sums
 
-  !> Root mean square speed of the fastest species after kicks or at sources; 0 without kicks and sources.
+  !> Root mean square speed of the fastest species after kicks or at sources; 0 without kicks and
+  !> sources.
   pure module function fastest_drive(self) result(speed)
     class(simulation_t), intent(in) :: self
     real(real64) :: speed                         !! [length/time]
@@ -31,7 +34,8 @@ contains
     speed = sqrt(max(maxval([0.0_real64, kick_speed2(self)]), source_speed2(self)))
   end function fastest_drive
 
-  !> Mean square of the velocity that a kick sets or adds, for the disks of each species; 0 for species without driving.
+  !> Mean square of the velocities set or added by a kick, for the disks of each species; 0 for
+  !> species without driving.
   pure function kick_speed2(self) result(speed2)
     class(simulation_t), intent(in) :: self
     real(real64) :: speed2(size(self%species))    !! [(length/time)**2]
@@ -44,7 +48,7 @@ contains
     end do
   end function kick_speed2
 
-  !> Mean square of the velocity of entering disks, for the fastest source; 0 without sources.
+  !> Mean square velocity of the disks entering through the fastest source; 0 without sources.
   pure function source_speed2(self) result(speed2)
     class(simulation_t), intent(in) :: self
     real(real64) :: speed2                        !! [(length/time)**2]
@@ -70,9 +74,11 @@ contains
     end do
   end function mean_square_speed
 
-  !> Chooses the units of the sums from the sizes of typical terms, which are estimated from the mean square speed of the disks and
-  !> from the effects of gravity, walls and kicks. If masses differ widely, terms of the lightest disks still have 40 binary digits
-  !> each. Terms of the heaviest disks may exceed the bound of `exact_sum_t`; adding such rare terms takes slightly longer.
+  !> Chooses the units of the sums from the sizes of typical terms. These are estimated from the
+  !> mean square speed of the disks and from the effects of gravity, walls and kicks. If the masses
+  !> differ widely, terms of the lightest disks still have 40 binary digits each. Terms of the
+  !> heaviest disks may exceed the bound of `exact_sum_t`; adding such rare terms takes slightly
+  !> longer.
   pure module subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self
     real(real64) :: mass(size(self%disk))         ! [mass]
