@@ -3,11 +3,11 @@
     python tests/support/check_style.py [FOLDER]
 
 The script prints one line per problem.  It checks that dependences between folders agree with the
-arrows in src/README.md and post/ricochet/README.md.  It checks the lengths of files, procedures and
-argument lists, the comments before procedures, the visibility of names, and the choice of names.
-It also checks the help texts, the first words of sentences, and the use of a few forbidden words.
-Finally it checks that there are no preprocessor directives and no paths that exist only on one
-computer.
+arrows in src/README.md and post/ricochet/README.md.  It checks the lengths of files, procedures,
+argument lists and comment lines, the comments before procedures, the visibility of names, and the
+choice of names.  It also checks the help texts, the first words of sentences, and the use of a few
+forbidden words.  Finally it checks that there are no preprocessor directives and no paths that
+exist only on one computer.
 """
 
 import ast
@@ -25,6 +25,8 @@ MOST_LINES_OF_PROCEDURE = 60
 MOST_LINES_WITHOUT_COMMENT = 9
 MOST_ARGUMENTS = 7
 MOST_FILES_OF_FOLDER = 15
+MOST_COLUMNS_OF_COMMENT = 100
+MOST_COLUMNS_WITH_COMMENT = 110
 CODE = {".F90", ".c", ".f90", ".js", ".pf", ".py", ".sh"}
 ARROWS = re.compile(r"^ *(\w+) *--> *(\w+(?: *& *\w+)*) *$", re.MULTILINE)
 UNIT = re.compile(r"\s*(?:module|program|(submodule)\s*\(\w+\))\s+(\w+)\s*$")
@@ -175,6 +177,19 @@ def procedure_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
             start, name = number, procedure[1]
             if EMPTY_WORDS.match(name):
                 yield Problem(path, number, f"{name}: such a name says nothing; say what it is")
+
+
+def column_problems(path: Path, text: str) -> Iterator[Problem]:
+    """Return comment lines, and lines of code with a comment, that are too long."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if re.match(r"\s*!(?!\$)", line):
+            most = MOST_COLUMNS_OF_COMMENT
+        elif "!" in re.sub(r"'[^']*'|\"[^\"]*\"", "", line) and not re.match(r"\s*!", line):
+            most = MOST_COLUMNS_WITH_COMMENT
+        else:
+            continue
+        if len(line) > most:
+            yield Problem(path, number, f"comment beyond column {most}")
 
 
 def statements_of(text: str) -> list[tuple[int, str]]:
@@ -362,6 +377,7 @@ def problems_of(root: Path) -> Iterator[Problem]:
         yield from unit_problems(own, lines)
         yield from procedure_problems(own, lines)
         yield from heading_problems(own, text)
+        yield from column_problems(own, text)
     yield from name_problems(root, paths)
     if (package := root / "post" / "ricochet").is_dir():
         yield from import_problems(root, package)

@@ -295,6 +295,23 @@ def test_a_style_problem_is_reported_at_its_line(tmp_path, before, after, line, 
     assert words in problem
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "most"),
+    [("  !> Twice.", "  !> Twice. ", 100), ("2*x*value", "2*x*value  ! ", 110)],
+)
+@pytest.mark.parametrize("excess", [0, 1])
+def test_a_comment_ends_at_its_column(tmp_path, old, new, most, excess):
+    """Comment lines have 100 columns, and lines of code with a comment have 110."""
+    text = MODULE.replace(old, new, 1)
+    (line,) = [line for line in text.splitlines() if line.endswith(new)]
+    problems = style_problems(
+        tmp_path, text.replace(line, line + "x" * (most + excess - len(line)))
+    )
+    assert [problem.split(": ")[1] for problem in problems] == [
+        f"comment beyond column {most}"
+    ] * excess
+
+
 @pytest.mark.parametrize(("lines", "is_public", "expected"), [(9, 0, 0), (10, 0, 1), (9, 1, 2)])
 def test_only_small_private_procedures_need_no_comment(tmp_path, lines, is_public, expected):
     """A public one has a second problem here, because nobody uses it."""
