@@ -525,8 +525,8 @@ contains
         do k = 1, size(groups(g)%values)
           if (.not. groups(g)%values(k)%is_set()) cycle
           most = most_written
-          ! Obstacles are written with all values, because obstacles read from a file are not
-          ! described otherwise.
+          ! Obstacles are written with all values, because the text does not describe obstacles read
+          ! from a file otherwise.
           if (any(obstacle_groups == groups(g)%name)) most = huge(most)
           call growing%add(groups(g)%value_line(k, most)//eol)
         end do

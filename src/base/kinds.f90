@@ -7,8 +7,8 @@ module kinds
 
   integer, parameter :: int128 = selected_int_kind(38)
 
-  !> Time of an event that does not occur, later than any actual event. It is finite, because sums
-  !> and products with infinity could be NaN.
+  !> Time of an event that does not occur, later than any actual event. The value is finite, because
+  !> sums and products with infinity could be NaN.
   real(real64), parameter :: never = 1.0e150_real64
   !> Largest integer up to which double precision represents all integers exactly.
   real(real64), parameter :: largest_exact = 2.0_real64**53

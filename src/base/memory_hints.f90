@@ -1,4 +1,4 @@
-!> Prefetch hints, which Fortran cannot express. They change the speed of a run but never its
+!> Prefetch hints, which Fortran cannot express. Prefetches change the speed of a run but never its
 !> results. The C file `memory_hints.c` contains the code that depends on compiler and operating
 !> system; if the macro `MEMORY_HINTS` is undefined, a prefetch does nothing.
 module memory_hints

@@ -49,8 +49,8 @@ contains
     call fill(self, state)
   end subroutine seed
 
-  !> Starts a separate random stream for a single draw during a run. Its numbers depend only on the
-  !> arguments, and not on the thread or on earlier draws.
+  !> Starts a separate random stream for a single draw during a run. The random numbers depend only
+  !> on the arguments, and not on the thread or on earlier draws.
   pure subroutine seed_draw(self, number, purpose, id, count)
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: number        !! seed from the input
@@ -165,8 +165,8 @@ contains
   end subroutine draw_direction
 
   !> Draws two independent Gaussian random numbers of zero mean and unit variance by the polar
-  !> method (Marsaglia and Bray, 1964, doi:10.1137/1006063). Their last bits may depend on the
-  !> mathematical library, which computes the logarithm.
+  !> method (Marsaglia and Bray, 1964, doi:10.1137/1006063). The last bits of the numbers may depend
+  !> on the mathematical library, which computes the logarithm.
   pure subroutine draw_normals(self, z)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: z(2)

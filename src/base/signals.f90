@@ -46,7 +46,7 @@ module signals
 contains
 
   !> From this call on, a stop signal ends the program immediately, with the given message and exit
-  !> status. If a stop signal was recorded earlier, this call ends the program. It is made before
+  !> status. If a stop signal was recorded earlier, this call ends the program. The call precedes
   !> tasks that can be interrupted without losing data.
   subroutine end_at_signals(message, code)
     character(len=*), intent(in) :: message

@@ -63,8 +63,8 @@ module system
     end function seconds
 
     !> Opens /dev/null for each standard stream that was closed when the program started. Otherwise
-    !> the next file to be opened would receive its descriptor, and messages would be written to
-    !> that file.
+    !> the next file to be opened would receive the descriptor of the stream, and messages would be
+    !> written to that file.
     subroutine fill_standard_streams() bind(C, name="system_fill_standard_streams")
     end subroutine fill_standard_streams
 
@@ -74,7 +74,7 @@ module system
       logical(c_bool) :: yes
     end function talks_to_terminal
 
-    ! These functions are described in system_calls.c.
+    ! The functions declared here are described in system_calls.c.
     function cores_of_process() result(n) bind(C, name="system_cores")
       import :: c_int
       integer(c_int) :: n

@@ -214,10 +214,10 @@ contains
     end associate
   end function is_due
 
-  !> Moves disk i to a new position. Its trajectory begins anew: the last collision partner, the
-  !> time of the last contact and the image counters are reset. The disk receives the given velocity
-  !> without rotation, or a velocity and rotation from the Maxwell distribution. The change of its
-  !> total energy (kinetic, rotational and potential) is added to `drive_energy`.
+  !> Moves disk i to a new position. The trajectory of the disk begins anew: the last collision
+  !> partner, the time of the last contact and the image counters are reset. The disk receives the
+  !> given velocity without rotation, or a velocity and rotation from the Maxwell distribution. The
+  !> change of its total energy (kinetic, rotational and potential) is added to `drive_energy`.
   subroutine move_disk(self, sim, i, x, stream)
     class(recycle_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim

@@ -31,8 +31,8 @@ contains
     if (sound) call check_cover(fields, "region", source%region, box)
   end subroutine check_source
 
-  !> Time when source s acts next; `never` if no disk of its species is waiting, or if the source
-  !> ends earlier.
+  !> Time when source s acts next; the result is `never` if no disk of the species is waiting, or if
+  !> the source ends earlier.
   pure function entry_time(sim, s) result(t)
     type(simulation_t), intent(in) :: sim
     integer, intent(in) :: s                                 !! index of the source

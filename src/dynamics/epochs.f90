@@ -1,6 +1,6 @@
 !> Divides a run into epochs. At the end of an epoch the time origin moves, and the state is tested
-!> for an inelastic collapse. Both depend only on the state of the simulation, and not on the
-!> search, the queue or the number of threads.
+!> for an inelastic collapse. The time and the result of the test depend only on the state of the
+!> simulation, and not on the search, the queue or the number of threads.
 module epochs
   use box_sides, only: separate_from_sides
   use kinds, only: int32, int64, never, pi, real64
@@ -16,8 +16,8 @@ module epochs
   !> Intended number of collisions per disk in an epoch. Moving the time origin at the end of each
   !> epoch preserves the precision of times.
   integer(int64), parameter :: epoch_length = 24
-  !> ^number of significant bits in a shift of the time origin, small enough for shifts to be added
-  !> without rounding errors
+  !> Number of significant bits in a shift of the time origin, small enough for shifts to be added
+  !> without rounding errors.
   integer, parameter :: significant_bits = 20
   !> A collapse is reported if time does not advance during at least `collapse_length` events, and
   !> at least `collapse_length_per_disk` events per disk.
@@ -98,10 +98,10 @@ contains
 
   !> Ends the epoch and moves the time origin to about the present time, which preserves the
   !> precision of times. Afterwards all events must be predicted anew, so this is also when the
-  !> disks are sorted by cells. The next epoch ends at a fixed time instead of a fixed number of
-  !> events, so that domains can end it independently at the same time. If the epoch was ended by a
-  !> single event or a kick (see `ends_by_event` and `ends_by_kick`), a disk can be much faster than
-  !> before, and the time origin moves exactly to the present time.
+  !> disks are sorted by cells. The end of the next epoch is a fixed time and not a fixed number of
+  !> events, so that all domains can independently end the epoch at the same time. If the epoch was
+  !> ended by a single event or a kick (see `ends_by_event` and `ends_by_kick`), a disk can be much
+  !> faster than before, and the time origin moves exactly to the present time.
   subroutine move_epoch(sim, is_urgent)
     type(simulation_t), intent(inout) :: sim
     logical, intent(in) :: is_urgent               !! whether the epoch was ended by a single event or a kick
@@ -159,7 +159,7 @@ contains
     end do
   end subroutine move_origin
 
-  !> Number of events, since the start of the run, at which the epoch ends early. This limit is
+  !> Number of events, since the start of the run, at which the epoch ends early. The limit is
   !> reached only if the event rate is far higher than expected, for example before an inelastic
   !> collapse.
   pure function most_events(sim) result(n)
@@ -299,10 +299,10 @@ contains
     end do
   end function is_at_rest
 
-  !> The disk of lowest id that rests on a side while other disks move; 0 if there is none. Its last
-  !> event and its next bounce on a dissipative side are both within `negligible_time` of the
-  !> present time. Its bounces are lower than the spacing of its coordinates; they therefore
-  !> converge, and time stops advancing.
+  !> The disk of lowest id that rests on a side while other disks move; 0 if there is none. The last
+  !> event of the disk and its next bounce on a dissipative side are both within `negligible_time`
+  !> of the present time. The bounces of this disk are lower than the spacing of its coordinates;
+  !> the bounces therefore converge, and time stops advancing.
   pure function disk_on_side(sim) result(found)
     type(simulation_t), intent(in) :: sim
     integer(int32) :: found, i

@@ -1,6 +1,6 @@
-!> A priority queue of events: a min-heap in an array, with four children per node. It contains at
-!> most one event per disk, found by the index of the disk. The order of simultaneous events depends
-!> neither on the order of insertion nor on which of the two disks stores an event.
+!> A priority queue of events: a min-heap in an array, with four children per node. The heap
+!> contains at most one event per disk, found by the index of the disk. The order of simultaneous
+!> events depends neither on the order of insertion nor on which of the two disks stores an event.
 module event_heap
   use kinds, only: int32
   use disks, only: tag_t

@@ -330,8 +330,8 @@ contains
 
   !> Moves the valid events of a bucket to a sorted list. An entry is invalid if the event stored by
   !> its disk is due in a later window. The position of an event in the list is the number of later
-  !> events. It is counted without branches that depend on the times, which is fast for the few
-  !> events of a bucket.
+  !> events. Counting the later events needs no branches that depend on the times, and is fast for
+  !> the few events of a bucket.
   pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)

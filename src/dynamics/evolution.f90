@@ -86,7 +86,7 @@ contains
   end function reached
 
   !> True if a quantity that can change in any collision, such as the dissipated energy, has reached
-  !> its limit. Such a quantity must never decrease during a run: a parallel run detects an exceeded
+  !> its limit. Such a quantity must never decrease during a run. A parallel run detects an exceeded
   !> limit only at the end of a time window, and then repeats the window to find the collision at
   !> which the limit was reached.
   pure function outgrown(self, tally) result(yes)

@@ -103,8 +103,8 @@ contains
   end function rests
 
   !> True if, at the start of an epoch, rounding errors dominate the kinetic energy relative to the
-  !> mean velocity. This occurs only in a system that would cool for ever: inelastic disks in a
-  !> periodic box.
+  !> mean velocity. Only a system that would cool for ever, inelastic disks in a periodic box, can
+  !> become so cold.
   pure function too_cold(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

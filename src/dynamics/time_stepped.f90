@@ -244,7 +244,7 @@ contains
     end subroutine meet_disk
   end subroutine take_step
 
-  !> First position after `after` at which the array contains 1; 0 if there is none.
+  !> Index of the first element after index `after` that is 1; 0 if there is none.
   pure function next_marked(mark, after) result(k)
     integer(int32), contiguous, intent(in) :: mark(:)
     integer(int32), intent(in) :: after

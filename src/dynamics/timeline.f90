@@ -153,7 +153,8 @@ contains
   end subroutine fail_at_standstill
 
   !> When a run has reached its number of events or collisions, reports whether time would stop
-  !> advancing if the run continued, because all disks are at rest or one disk rests on a side.
+  !> advancing if the run continued. Time stops if all disks are at rest or one disk rests on a
+  !> side.
   subroutine report_rest(evolution, sim, limits, error)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
@@ -173,10 +174,10 @@ contains
     if (last(1) > 0) call fail_at_standstill(sim, last, error)
   end subroutine report_rest
 
-  !> Number of iterations of the event loop that take about the wall-clock time `pause_interval`. It
-  !> is increased only after a call that used all its iterations. If calls that reach a limit early
-  !> increased it too, it would grow without bound in a run with many samples, and signals would
-  !> remain unchecked for hours after the last sample.
+  !> Number of iterations of the event loop that take about the wall-clock time `pause_interval`.
+  !> The number is increased only after a call that used all its iterations. If calls that reach a
+  !> limit early increased it too, it would grow without bound in a run with many samples, and
+  !> signals would remain unchecked for hours after the last sample.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations [s]

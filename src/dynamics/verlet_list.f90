@@ -22,8 +22,8 @@ module verlet_list
   real(real64), parameter :: least_skin = 0.2_real64       !! minimum skin [mean diameters]
   real(real64), parameter :: cells_per_disk = 4.0_real64   !! maximum number of bins per disk
 
-  !> Pairs that may touch: first those of a disk and an obstacle, sorted by obstacle and then by
-  !> disk; then those of two disks, sorted by the first and then by the second disk.
+  !> Pairs that may touch. Pairs of a disk and an obstacle come first, sorted by obstacle and then
+  !> by disk. Pairs of two disks follow, sorted by the first and then by the second disk.
   type :: verlet_list_t
     integer(int32) :: n = 0
     integer(int32), allocatable :: i(:)        !! index of the first disk of each pair; size at least n
@@ -119,7 +119,7 @@ contains
   contains
 
     !> Width of the skin for which a list is valid for many steps without containing too many
-    !> distant pairs. It affects only the speed of the program.
+    !> distant pairs. The width affects only the speed of the program.
     pure function wanted_skin() result(skin)
       real(real64) :: skin, diameter, reach, fastest
       integer(int32) :: i

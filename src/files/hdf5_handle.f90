@@ -132,8 +132,8 @@ contains
   end function hdf5_version
 
   !> Initialises the HDF5 library, once per process because each initialisation leaks memory. HDF5
-  !> must not print errors. It needs no exit handler, because the program closes all files before it
-  !> exits; on a full disk, where a file cannot be closed, the exit handler would crash. External
+  !> must not print errors. HDF5 needs no exit handler, because the program closes all files before
+  !> it exits; on a full disk, where a file cannot be closed, the exit handler would crash. External
   !> links are disabled, because they could refer to devices or to files of other users.
   subroutine start_library(status)
     integer, intent(out) :: status
@@ -157,8 +157,8 @@ contains
   !>   equal runs write identical bytes.
   !> - Small datasets do not share a block of storage, because HDF5 releases a shared block in two
   !>   steps, between which the header of the file contains a wrong length.
-  !> - No space is reserved for attributes of datasets, because the program writes none. This
-  !>   reduces the file of a small run by a tenth.
+  !> - No space is reserved for attributes of datasets, because the program writes none. The file of
+  !>   a small run is therefore a tenth smaller.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
     integer(hid_t), intent(out) :: access         !! HDF5 properties for opening the file

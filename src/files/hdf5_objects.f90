@@ -47,8 +47,8 @@ contains
 
   !> Removes the most recently created dataset, so that the file ends after the values of the
   !> dataset `before`. Each of the three steps leaves a valid file:
-  !> 1. The link to the dataset is deleted. Its storage is not freed yet, because the dataset is
-  !>    still open.
+  !> 1. The link to the dataset is deleted. The storage of the dataset is not freed yet, because the
+  !>    dataset is still open.
   !> 2. The new length of the file is written to its header. HDF5 itself would write this length
   !>    only after truncating the file.
   !> 3. The dataset is closed, which frees the storage.
@@ -191,8 +191,8 @@ contains
     class(hdf5_file_t), intent(inout) :: self
     integer(hid_t), intent(in) :: dataset
     integer(int64), intent(in) :: first           !! first index along the last dimension, starting at 1
-    !> Number of values along each dimension. Only along the last dimension may the part be smaller
-    !> than the dataset.
+    !> Number of values along each dimension. The part may be smaller than the dataset only along
+    !> the last dimension.
     integer(int64), intent(in) :: counts(:)
     integer(hid_t), intent(in) :: type            !! HDF5 type in memory
     type(c_ptr), intent(in) :: address

@@ -21,8 +21,8 @@ module hdf5_series
   integer(int64), parameter :: copied_at_once = 1048576     !! buffer size for copying [bytes]
 
   !> One series. Once its name, storage type and shape are set, the series is created in a new file
-  !> or located in an existing file. Its dataset then stays open until `close`, or until the file
-  !> that holds it is closed.
+  !> or located in an existing file. The dataset then stays open until `close`, or until its file is
+  !> closed.
   type :: series_t
     character(len=96) :: name = ""                !! path of the dataset
     integer :: storage = double_precision

@@ -16,7 +16,7 @@ module run_files
     unfinished = ".part", &
     !> Extension of a new output file until it is complete.
     unfinished_new = ".part_new", &
-    !> extension of the lock file, which prevents other runs from writing the same output
+    !> Extension of the lock file, which prevents other runs from writing the same output.
     lock = ".lock"
   character(len=9), parameter :: endings(*) = [character(len=9) :: "", unfinished, unfinished_new, lock]
 

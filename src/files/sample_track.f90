@@ -156,8 +156,8 @@ contains
     end do
   end subroutine link_step_and_time
 
-  !> Locates the series in an existing file, which remains unchanged, to continue after the first
-  !> `count` samples.
+  !> Locates the series in an existing file, to continue after the first `count` samples. The file
+  !> is not changed.
   subroutine resume(self, file, count)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

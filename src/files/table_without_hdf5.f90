@@ -1,5 +1,5 @@
-!> Implementation of `table_file` without HDF5, for libricochet.so. It reports that tables in HDF5
-!> files cannot be read.
+!> Implementation of `table_file` for libricochet.so, which has no HDF5. The procedure reports that
+!> tables in HDF5 files cannot be read.
 submodule(table_file) table_without_hdf5
   use errors, only: exit_usage, fail
   implicit none

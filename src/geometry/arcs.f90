@@ -4,9 +4,10 @@
 !> The radius of this circle is the sum of both radii for a disk outside the arc, and their
 !> difference for a disk inside. In both cases the centre of the disk must lie between the first and
 !> the last angle of the arc. From inside, a disk larger than the arc can touch only the ends. The
-!> centre of a disk that touches an end lies on a circle about this end, which meets the circles of
-!> both faces (the outer and the inner side of the arc) with common tangents. If rounding errors
-!> hide a contact with a face near an end, the contact is therefore found as a contact with the end.
+!> centre of a disk that touches an end lies on a circle about this end. This circle meets the
+!> circles of both faces (the outer and the inner side of the arc) with common tangents. If rounding
+!> errors hide a contact with a face near an end, the contact is therefore found as a contact with
+!> the end.
 module arcs
   use free_flight, only: flight, later_time_to_circle, time_to_circle
   use kinds, only: never, pi, real64
@@ -127,10 +128,10 @@ contains
     point = self%centre + self%radius*self%end_direction(:, k)
   end function end_point
 
-  !> Tangential velocity of the surface at a point of contact, if the surface moves
-  !> counter-clockwise along the arc with unit speed: the unit tangent vector of the circle at the
-  !> nearest point of the arc, without its component along the surface normal. The ends of the arc
-  !> therefore move more slowly than the rest.
+  !> Tangential velocity of the surface at a point of contact, for a surface that moves
+  !> counter-clockwise along the arc with unit speed. The velocity is the unit tangent vector of the
+  !> circle at the nearest point of the arc, without its component along the surface normal. The
+  !> ends of the arc therefore move more slowly than the rest.
   pure function direction(self, d, normal) result(along)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), normal(2)
@@ -200,8 +201,8 @@ contains
       t = never
     end function time_to_face
 
-    !> True if a disk on a straight path moves away from a point or, within rounding errors,
-    !> perpendicular to the direction of the point. A disk moving away from the centre of a circle
+    !> True if a disk on a straight path moves away from a point or, within rounding errors, at a
+    !> right angle to the direction of the point. A disk moving away from the centre of a circle
     !> cannot collide with the circle from outside; without this test, rounding errors could cause a
     !> second collision with the same face or end of the arc.
     pure function grazes(from) result(yes)

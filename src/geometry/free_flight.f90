@@ -39,8 +39,9 @@ contains
     then = v + g*s
   end function flight_velocity
 
-  !> Time until a point crosses a line in the forward direction; `never` if it does not. In each
-  !> branch, the root of the quadratic equation is calculated by the formula without cancellation.
+  !> Time until a point crosses a line in the forward direction; the result is `never` if it does
+  !> not. In each branch, the root of the quadratic equation is calculated by the formula without
+  !> cancellation.
   pure function time_to_line(distance, speed, acceleration) result(s)
     real(real64), intent(in) :: distance  !! distance to the line; negative behind the point [length]
     real(real64), intent(in) :: speed         !! velocity component towards the line [length/time]
@@ -93,7 +94,7 @@ contains
     if (inside) then
       if (.not. speed2 > 0) return
       ! Inside the circle this form is free of cancellation. If a disk moves along the circle, b and
-      ! c are rounding errors, and the other form of the discriminant can vanish; the contact time,
+      ! c are rounding errors, and the other form of the discriminant can vanish. The contact time,
       ! which is about 0, would then be the ratio of two rounding errors.
       if (c < 0) disc = b*b - speed2*c
       disc = sqrt(max(disc, 0.0_real64))
@@ -109,9 +110,9 @@ contains
 
   !> True if an accelerated point certainly does not enter a circle about the origin during a given
   !> time; it may start on the circle. The squared distance from the origin minus the squared radius
-  !> is a quartic polynomial in time. Its values in an interval are never below the smallest of its
-  !> Bernstein coefficients, and the coefficients converge to the values when the interval is halved
-  !> repeatedly.
+  !> is a quartic polynomial in time. The values of a polynomial in an interval are never below the
+  !> smallest of its Bernstein coefficients, and the coefficients converge to the values when the
+  !> interval is halved repeatedly.
   pure function misses_circle(d, v, g, rho, within) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), rho, within
     logical :: yes

@@ -3,9 +3,9 @@
 !>
 !> A disk touches a wall when its centre reaches the stadium around the wall. The stadium consists
 !> of two straight sides, parallel to the wall at a distance of one disk radius, and of two half
-!> circles about the ends. It is convex, so the centre of a disk can reach a straight side only from
-!> outside. If rounding errors hide a contact with a straight side near an end of the wall, the
-!> contact with the half circle is found instead.
+!> circles about the ends. The stadium is convex, so the centre of a disk can reach a straight side
+!> only from outside. If rounding errors hide a contact with a straight side near an end of the
+!> wall, the contact with the half circle is found instead.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
   use kinds, only: never, real64
@@ -44,9 +44,10 @@ contains
     if (segment%length > 0) segment%along = segment%half/segment%length
   end function new_segment
 
-  !> Tangential velocity of the surface at a point of contact, if the surface moves along the wall
-  !> with unit speed: the unit vector along the wall, without its component along the surface
-  !> normal. At the ends of the wall the surface therefore moves more slowly than between them.
+  !> Tangential velocity of the surface at a point of contact, for a surface that moves along the
+  !> wall with unit speed. The velocity is the unit vector along the wall, without its component
+  !> along the surface normal. At the ends of the wall the surface therefore moves more slowly than
+  !> between them.
   pure function direction(self, d, normal) result(along)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
@@ -74,8 +75,8 @@ contains
   contains
 
     !> Time until the centre of a disk reaches the straight side of the stadium in the direction
-    !> `across`; `never` if it passes beyond an end of the wall. The distance is a quadratic
-    !> function of time, so the side is reached from outside at most once.
+    !> `across`; the result is `never` if the centre passes beyond an end of the wall. The distance
+    !> is a quadratic function of time, so the side is reached from outside at most once.
     pure function time_to_side() result(t)
       real(real64) :: t, away, speed, fall, disc
 

@@ -37,9 +37,9 @@ module shapes
   end type shape_t
 
   abstract interface
-    !> Time until the rim of a disk touches the outline; `never` if there is no contact. The result
-    !> is 0 if the disk already touches the outline (or overlaps it owing to rounding) and is moving
-    !> towards it.
+    !> Time until the rim of a disk touches the outline; the result is `never` if there is no
+    !> contact. The result is 0 if the disk already touches the outline (or overlaps it owing to
+    !> rounding) and is moving towards it.
     pure function contact_time(self, d, v, g, radius, within) result(s)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self

@@ -336,7 +336,7 @@ contains
     end do
   end subroutine report_conflicts
 
-  !> Adds conflicts with gravity, shear, time steps and Helfand moments.
+  !> Adds settings that cannot be combined with gravity, shear, time steps or Helfand moments.
   pure subroutine add_box_conflicts(settings, names, conflicts)
     type(settings_t), intent(in) :: settings
     character(len=*), intent(in) :: names(:)            !! names of all groups
@@ -361,7 +361,7 @@ contains
     end associate
   end subroutine add_box_conflicts
 
-  !> Adds conflicts with the stop rule `energy_fraction` in a closed system.
+  !> Adds settings that cannot be combined with the stop rule `energy_fraction` in a closed system.
   pure subroutine add_energy_conflicts(settings, must_end, conflicts)
     type(settings_t), intent(in) :: settings
     logical, intent(in) :: must_end
@@ -382,7 +382,7 @@ contains
     end associate
   end subroutine add_energy_conflicts
 
-  !> Adds conflicts with the stop rule `at_rest`.
+  !> Adds settings that cannot be combined with the stop rule `at_rest`.
   pure subroutine add_rest_conflicts(settings, conflicts)
     type(settings_t), intent(in) :: settings
     type(conflict_list_t), intent(inout) :: conflicts
@@ -403,7 +403,7 @@ contains
     end associate
   end subroutine add_rest_conflicts
 
-  !> Adds conflicts with the openness of the system.
+  !> Adds settings that cannot be combined with an open system.
   pure subroutine add_conflicts_of_open_systems(settings, names, conflicts)
     type(settings_t), intent(in) :: settings
     character(len=*), intent(in) :: names(:)            !! names of all groups
@@ -420,7 +420,7 @@ contains
       "stop.disks_inside", "closed sides (side.open): no disk ever leaves the box")
   end subroutine add_conflicts_of_open_systems
 
-  !> Adds conflicts with the driving.
+  !> Adds settings that cannot be combined with the driving.
   pure subroutine add_drive_conflicts(settings, conflicts)
     type(settings_t), intent(in) :: settings
     type(conflict_list_t), intent(inout) :: conflicts

@@ -132,8 +132,8 @@ contains
     end if
   end subroutine take_count
 
-  !> Checks the number of waiting disks. Their radii and masses must be given in the input, because
-  !> initial-configuration files contain no waiting disks.
+  !> Checks the number of waiting disks. Radii and masses of waiting disks must be given in the
+  !> input, because initial-configuration files contain no waiting disks.
   subroutine check_waiting(group, s, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s

@@ -120,8 +120,8 @@ contains
     yes = any(group%values%name == name .and. group%values%given)
   end function has
 
-  !> Reads the obstacles of a group from its file. Their data are stored as lists of values, in the
-  !> variables that otherwise describe a single obstacle.
+  !> Reads the obstacles of a group from its file. The data of the obstacles are stored as lists of
+  !> values, in the variables that otherwise describe a single obstacle.
   subroutine take_file(group, problems)
     type(group_t), intent(inout) :: group
     type(problem_list_t), intent(inout) :: problems

@@ -201,7 +201,7 @@ contains
     if (status == 0) problem = ""
   end subroutine read_integer
 
-  !> Reads a decimal number with an optional exponent e or d, as in Fortran. Its absolute value must
+  !> Reads a decimal number with an optional exponent e or d, as in Fortran. The absolute value must
   !> be 0 or between 1e-100 and 1e100, so that overflow and denormal numbers are impossible.
   pure subroutine read_real(word, value, problem)
     character(len=*), intent(in) :: word

@@ -76,7 +76,7 @@ contains
 
   !> Maximum polydispersity allowed for a distribution.
   pure function widest_spread(distribution) result(spread)
-    !> 'uniform', 'gaussian' or 'lognormal'
+    !> Distribution: 'uniform', 'gaussian' or 'lognormal'.
     character(len=*), intent(in) :: distribution
     real(real64) :: spread
 

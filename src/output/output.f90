@@ -3,8 +3,9 @@
 !> other runs from writing to the same output.
 !>
 !> The layout of an output file never changes after its creation. If the number of samples is known
-!> at the start, the file has exactly the space required. Otherwise a full file is replaced by a
-!> larger one, by an atomic renaming, and at the end of the run by a copy without unused space.
+!> at the start, the file has exactly the space required. If the number is unknown, a full file is
+!> replaced by a larger one, by an atomic renaming; at the end of the run the file is replaced by a
+!> copy without unused space.
 module output
   use kinds, only: int64, never, real64
   use sampling_schedule, only: frames, progress_t, values

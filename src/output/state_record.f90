@@ -22,7 +22,7 @@ contains
   !> Counts, writes or reads the numbers of a checkpoint. Before a checkpoint is read, the box and
   !> the species of the simulation must be set.
   subroutine exchange_all(file, record, sim, progress)
-    type(hdf5_file_t), intent(inout) :: file      !! not accessed if the numbers are only counted
+    type(hdf5_file_t), intent(inout) :: file      !! not used when the numbers are only counted
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout) :: sim
     type(progress_t), intent(inout) :: progress

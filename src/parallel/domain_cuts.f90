@@ -67,9 +67,9 @@ contains
     end do
   contains
 
-    !> Chooses the number of slabs and the number of domains in each slab, such that the estimated
-    !> work is minimal, the total number of domains is not much smaller than `wanted`, and no domain
-    !> is too narrow.
+    !> Chooses the number of slabs and the number of domains in each slab. The estimated work is
+    !> minimised under two conditions: the total number of domains is not much smaller than
+    !> `wanted`, and no domain is too narrow.
     pure function numbers() result(n)
       integer(int32) :: n(2), most(2), columns, rows
 

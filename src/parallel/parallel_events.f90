@@ -1,8 +1,8 @@
 !> Parallel event-driven dynamics, on several cores, or on one core with domains that fit into its
 !> cache. The results are bit-identical to those of the serial engine. The box is divided into
-!> domains, each with its own engine. They advance independently through one time window and are
-!> then compared (see `partition` and `domains`). If a window is invalid, the simulation returns to
-!> its state before the present series of windows. The serial engine takes over for small or
+!> domains, each with its own engine. The domains advance independently through one time window and
+!> are then compared (see `partition` and `domains`). If a window is invalid, the simulation returns
+!> to its state before the present series of windows. The serial engine takes over for small or
 !> inactive systems, for a stop between simultaneous collisions, and in an inelastic collapse.
 module parallel_events
   use kinds, only: int32, int64, real64
@@ -21,8 +21,8 @@ module parallel_events
   integer, parameter :: most_windows = 24      !! maximum number of windows in one call of `run_domains`
   !> Minimum length of a window, relative to the usual length.
   real(real64), parameter :: shortest = 0.1_real64
-  !> Minimum number of events per disk before the next limit for which domains pay off: `least_left`
-  !> if they are in use, `least_left_to_begin` otherwise.
+  !> Domains pay off if at least this number of events per disk remains before the next limit:
+  !> `least_left` if domains are in use, otherwise `least_left_to_begin`.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
   !> Minimum and maximum period of the serial engine when domains cannot be used: a limit or an
   !> inelastic collapse was reached, or no event is left [events per disk].
@@ -205,8 +205,8 @@ contains
   end function most_windows_now
 
   !> Lengthens the windows after a call in which all were valid. Within a call the length is
-  !> constant. If it grew, the last window of every call could be invalid; since this invalidates
-  !> all windows of the call, the run would make no progress.
+  !> constant. If the length grew, the last window of every call could be invalid. One invalid
+  !> window invalidates all windows of a call, so the run would make no progress.
   pure subroutine lengthen_windows(self, windows)
     class(parallel_events_t), intent(inout) :: self
     integer, intent(in) :: windows               !! number of windows in the last call
@@ -216,8 +216,8 @@ contains
     end associate
   end subroutine lengthen_windows
 
-  !> Shortens the windows after an invalid one. If they already have the minimum length, the serial
-  !> engine is selected for a period.
+  !> Shortens the windows after an invalid one. If the windows already have the minimum length, the
+  !> serial engine is selected for a period.
   subroutine shorten_windows(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

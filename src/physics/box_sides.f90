@@ -139,9 +139,9 @@ contains
   end subroutine next_side
 
   !> Moves a disk away from moving sides that it would touch before the time `now`. A new time
-  !> origin changes the position and velocity of a moving side within rounding errors, which can
-  !> shift the predicted contact of a disk close to the side to a time before `now`. The
-  !> displacement of the disk is of the order of these errors.
+  !> origin changes the position and velocity of a moving side by rounding errors. These can shift
+  !> the predicted contact of a disk close to the side to a time before `now`. The displacement of
+  !> the disk is of the order of these errors.
   pure subroutine separate_from_sides(box, disk, now)
     type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk

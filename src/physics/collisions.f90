@@ -43,9 +43,10 @@ module collisions
       //"then never undergo inelastic collapse, and never come to rest.")]
 
   !> Coefficient of restitution that approaches 1 at small impact velocities (Ramirez, Poschel,
-  !> Brilliantov and Schwager, Physical Review E 60, 4465 (1999)). Below a reference velocity g0 it
-  !> is 1 - y + c y**2 with y = y0 (g/g0)**(1/5), where y0 is chosen to give the value of the input
-  !> at g0; above g0 it is constant. With c = `no_series` it is 1 below g0.
+  !> Brilliantov and Schwager, Physical Review E 60, 4465 (1999)). Below a reference velocity g0 the
+  !> coefficient is 1 - y + c y**2 with y = y0 (g/g0)**(1/5); above g0 it is constant. The constant
+  !> y0 is chosen such that the coefficient at g0 is the value of the input. With c = `no_series`
+  !> the coefficient is 1 below g0.
   type :: speed_law_t
     !> Reference impact velocity g0; 0 for constant restitution [length/time].
     real(real64) :: speed = 0.0_real64
@@ -78,7 +79,7 @@ module collisions
 
   !> Contact law of disk-disk collisions, and contact duration of all collisions.
   type :: contact_law_t
-    !> Coefficient of restitution for each pair of species; a symmetric matrix.
+    !> Symmetric matrix of the coefficients of restitution for all pairs of species.
     real(real64), allocatable :: restitution(:, :)
     type(speed_law_t) :: by_speed = speed_law_t()    !! dependence on the impact velocity
     !> Contact duration t_c of the TC model (Luding and McNamara, Granular Matter 1, 113 (1998)): a

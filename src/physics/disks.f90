@@ -1,7 +1,7 @@
 !> Data of the disks, grouped by frequency of use. The record of a disk fills one cache line and is
-!> read in every prediction. Its tag fills half a cache line and is read only in events of the disk
-!> itself. Arrays of optional data exist only in some simulations. Derived data are not stored in
-!> checkpoints; they are recomputed whenever a run starts or resumes.
+!> read in every prediction. The tag of a disk fills half a cache line and is read only in events of
+!> the disk itself. Arrays of optional data exist only in some simulations. Derived data are not
+!> stored in checkpoints; they are recomputed whenever a run starts or resumes.
 module disks
   use free_flight, only: flight, flight_velocity
   use kinds, only: int16, int32, int64, largest_exact, never, real64
@@ -39,7 +39,7 @@ module disks
 
   integer, parameter :: longest_name = 40            !! maximum length of the name of a species
 
-  !> A species. Its disks have the same contact law and, unless masses are read from a file, the
+  !> A species, whose disks have the same contact law and, unless masses are read from a file, the
   !> same mass.
   type :: species_t
     character(len=:), allocatable :: name

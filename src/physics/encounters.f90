@@ -251,8 +251,8 @@ contains
     end if
   end function impulse_between
 
-  !> True if disk i is so much heavier than disk j that its velocity change loses significant
-  !> digits.
+  !> True if disk i is so much heavier than disk j that the velocity change of disk i loses
+  !> significant digits.
   pure function is_far_heavier(sim, i, j) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -434,8 +434,8 @@ contains
     if (sim%features%rotation) energy = energy + 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
   end function energy_of
 
-  !> Moves disk i by one period when it passes a periodic side at the time t. Its clock does not
-  !> change.
+  !> Moves disk i by one period when it passes a periodic side at the time t. The clock of the disk
+  !> does not change.
   subroutine pass_side(sim, i, code, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -455,9 +455,9 @@ contains
     end associate
   end subroutine pass_side
 
-  !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards): its position
-  !> is shifted by the displacement of the periodic image, and its velocity by the velocity of the
-  !> image. This is a change of the reference frame; no force acts on the disk.
+  !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards). The position
+  !> is shifted by the displacement of the periodic image, and the velocity by the velocity of the
+  !> image. Only the reference frame changes; no force acts on the disk.
   subroutine pass_sheared_boundary(sim, i, rows, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

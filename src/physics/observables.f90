@@ -298,9 +298,9 @@ contains
     end do
   end subroutine add_up
 
-  !> Two-dimensional pressure P by the virial theorem, P A = K + W/(2t), where K is the present
-  !> kinetic energy, A the present accessible area, t the time since the start of the run, and W the
-  !> sum of impulse times distance over all disk-disk collisions since then. Between walls, P
+  !> Two-dimensional pressure P by the virial theorem, P A = K + W/(2t). Here K is the present
+  !> kinetic energy, A the present accessible area, and t the time since the start of the run. W is
+  !> the sum of impulse times distance over all disk-disk collisions in this time. Between walls, P
   !> differs from the mean force per length of a wall, because walls act on the centres of disks at
   !> the distance of one radius.
   pure function pressure(sim, kinetic)

@@ -264,8 +264,8 @@ contains
     name = ""
   end function counter
 
-  !> Time of kick k; `never` without driving. It is k times the interval, because repeated addition
-  !> would accumulate rounding errors.
+  !> Time of kick k; `never` without driving. The time is calculated as k times the interval,
+  !> because repeated addition would accumulate rounding errors.
   pure function kick_time(self, k) result(t)
     class(system_t), intent(in) :: self
     integer(int64), intent(in) :: k

@@ -45,9 +45,9 @@ module tally
   integer, parameter, public :: outflow = 1, inflow = 2
 
   !> Maximum number of simultaneous collisions in a finite series, divided by the square of the
-  !> number of disks. It applies if the coefficient of restitution is at least 3 % above the value
-  !> below which a row of disks collapses. The largest value found is 9.7, in rows of up to 12 equal
-  !> touching disks, free or at a wall.
+  !> number of disks. This maximum applies if the coefficient of restitution is at least 3 % above
+  !> the value below which a row of disks collapses. The largest value found is 9.7, in rows of up
+  !> to 12 equal touching disks, free or at a wall.
   integer(int64), parameter :: longest_finite = 10
 
   type :: tally_t
@@ -118,8 +118,8 @@ contains
   end subroutine choose_units
 
   !> Fluxes of a disk in free flight: the components xx, xy and yy of the momentum flux [energy],
-  !> and the components x and y of the kinetic energy flux [energy length/time]. Their time
-  !> integrals are the kinetic parts of the Helfand moments (Physical Review 119, 1 (1960)).
+  !> and the components x and y of the kinetic energy flux [energy length/time]. The time integrals
+  !> of these fluxes are the kinetic parts of the Helfand moments (Physical Review 119, 1 (1960)).
   pure function kinetic_flux(mass, v)
     real(real64), intent(in) :: mass
     real(real64), intent(in) :: v(2)               !! [length/time]
@@ -137,8 +137,9 @@ contains
     total = self%sum(k)%value()
   end function total
 
-  !> Records the numbers of collisions and disks of a series of simultaneous collisions, if it is
-  !> the longest series so far and longer than any finite series in a row of as many equal disks.
+  !> Records the numbers of collisions and disks of a series of simultaneous collisions. Only the
+  !> longest series is recorded, and only if it is longer than any finite series in a row of as many
+  !> equal disks.
   pure subroutine note_series(self, collisions, disks)
     class(tally_t), intent(inout) :: self
     integer(int64), intent(in) :: collisions

@@ -74,7 +74,7 @@ contains
     end do
   end function mean_square_speed
 
-  !> Chooses the units of the sums from the sizes of typical terms. These are estimated from the
+  !> Chooses the units of the sums from the sizes of typical terms. The sizes are estimated from the
   !> mean square speed of the disks and from the effects of gravity, walls and kicks. If the masses
   !> differ widely, terms of the lightest disks still have 40 binary digits each. Terms of the
   !> heaviest disks may exceed the bound of `exact_sum_t`; adding such rare terms takes slightly

@@ -8,8 +8,8 @@
 !> the positions of all disks and the index of the moving disk. Each state has exactly one
 !> predecessor, and the motion preserves the volume in the space of states. Therefore the uniform
 !> distribution of all packings is stationary (global balance), although no chain moves backwards.
-!> This requires that the first disk of each chain is drawn uniformly from all disks, and that the
-!> length of the chain is independent of the positions.
+!> Two conditions are required for this: the first disk of each chain is drawn uniformly from all
+!> disks, and the length of the chain is independent of the positions.
 !>
 !> Along an axis with walls, a disk that reaches a side reverses its direction and continues
 !> (straight event chains in a box with walls, Li et al., 2022, doi:10.1063/5.0126437). The state of
@@ -129,10 +129,10 @@ contains
     end do
   end subroutine fill
 
-  !> Estimates the mean displacement of a disk in a chain. In equilibrium, Z - 1 equals the mean
-  !> distance between successive disks of a chain along its direction, pi/4 diameters, divided by
-  !> the mean displacement of a disk (Michel, Kapfer and Krauth, 2014, doi:10.1063/1.4863991), where
-  !> Z is the compressibility factor. For Z - 1 the larger of two estimates is used, from scaled
+  !> Estimates the mean displacement of a disk in a chain. In equilibrium, this displacement is pi/4
+  !> diameters divided by Z - 1, where pi/4 diameters is the mean distance between successive disks
+  !> of a chain along its direction, and Z is the compressibility factor (Michel, Kapfer and Krauth,
+  !> 2014, doi:10.1063/1.4863991). For Z - 1 the larger of two estimates is used, from scaled
   !> particle theory and from the free volume of a crystal.
   pure function mean_step(box, radius) result(step)
     type(box_t), intent(in) :: box

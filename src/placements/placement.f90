@@ -17,8 +17,8 @@ module placement
   !> Key of the random streams of placements.
   integer, parameter, public :: stream_number = 1
 
-  !> Disks placed in one call. They belong to one species or, for a placement `in_batches`, to all
-  !> species with this placement and the same region.
+  !> Disks placed in one call. The disks belong to one species or, for a placement `in_batches`, to
+  !> all species with this placement and the same region.
   type :: batch_t
     type(species_t), allocatable :: species(:)
     integer(int32) :: number = 0               !! index of the first of these species in the input

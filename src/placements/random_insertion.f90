@@ -6,9 +6,9 @@
 !> the distribution is therefore that of simple insertion, but saturation can be reached (Zhang and
 !> Torquato, 2013, doi:10.1103/PhysRevE.88.053312).
 !>
-!> Disks of different radii are inserted in the order of decreasing radius. In this case no voxels
-!> are eliminated, because a voxel without space for one disk may have space for a smaller one, and
-!> the insertion ends after many failed attempts.
+!> Disks of different radii are inserted in the order of decreasing radius. For different radii no
+!> voxels are eliminated, because a voxel without space for one disk may have space for a smaller
+!> one, and the insertion ends after many failed attempts.
 module random_insertion
   use kinds, only: int32, real64
   use memory_hints, only: prefetch

@@ -60,8 +60,9 @@ contains
     yes = .true.
   end function moves_all_disks
 
-  !> See `placement`. Event chains require a box without obstacles and moving sides. They sample the
-  !> uniform distribution of positions, which is the equilibrium distribution only without gravity.
+  !> See `placement`. Event chains require a box without obstacles and moving sides. Event chains
+  !> sample the uniform distribution of positions, which is the equilibrium distribution only
+  !> without gravity.
   pure function conflict(self, variable) result(reason)
     class(relaxed_placement_t), intent(in) :: self
     character(len=*), intent(in) :: variable

@@ -1,6 +1,5 @@
-!> Contacts that the simple search of 3 x 3 cells does not find: with disks in the linked lists of
-!> crowded cells, with disks across a periodic side, with obstacles and big disks, and with given
-!> disks.
+!> Contacts that the simple search of 3 x 3 cells does not find: with disks in linked lists of
+!> crowded cells or across a periodic side, with obstacles, and with big disks.
 module cell_scans
   use kinds, only: int32, int64, real64
   use box_geometry, only: find_image_contact, stays_clear

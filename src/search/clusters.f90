@@ -4,8 +4,8 @@
 !> The disks of such a cluster move so little that the normals of their contacts hardly change. The
 !> state of the cluster is therefore described not by positions and velocities but by the gap of
 !> each contact and the velocity at which the gap closes. In a collapse these numbers decrease by
-!> hundreds of powers of ten. They remain exact to rounding, whereas differences of positions would
-!> soon be smaller than the rounding errors of the positions.
+!> hundreds of powers of ten. The gaps and velocities remain exact to rounding, whereas differences
+!> of positions would soon be smaller than the rounding errors of the positions.
 !>
 !> Motion along the surfaces is included to first order. Two disks at a distance r that slip past
 !> each other with velocity w separate with the acceleration w**2/r (Zhou and Kadanoff, Physical
@@ -19,18 +19,18 @@ module clusters
   public :: cluster_t, contact_t, most_disks
 
   integer(int32), parameter :: most_disks = 40       !! maximum number of disks in a cluster
-  !> A series of collisions is considered unbounded if there are more than `longest` collisions
-  !> (`longest_rough` for rough disks) times the square of the number of colliding disks, or if the
-  !> closing velocities have decreased by the factor `slowest`. Finite series are shorter and slow
-  !> down less, except within about 1 % of a limit of collapse.
+  !> A series of collisions is considered unbounded in two cases. Either the number of collisions,
+  !> divided by the square of the number of colliding disks, exceeds `longest` (`longest_rough` for
+  !> rough disks), or the closing velocities have decreased by the factor `slowest`. Finite series
+  !> are shorter and slow down less, except within about 1 % of a limit of collapse.
   integer, parameter :: longest = 24, longest_rough = 240
   real(real64), parameter :: slowest = 1.0e-200_real64
   !> Maximum angle between the contact normals of a row of disks that is straight except for
-  !> rounding errors. These errors must not end the collapse of the row.
+  !> rounding errors. The rounding errors must not end the collapse of the row.
   real(real64), parameter :: straight = 2.0_real64**(-33)
 
-  !> A contact of two disks, or of a disk with a side or an obstacle. Its tangent is the normal
-  !> turned by -90 degrees.
+  !> A contact of two disks, or of a disk with a side or an obstacle. The tangent of a contact is
+  !> its normal turned by -90 degrees.
   type :: contact_t
     integer(int32) :: first = 0                      !! index of a disk in the cluster
     integer(int32) :: second = 0      !! index of the other disk in the cluster; 0 for a side or an obstacle

@@ -74,7 +74,7 @@ contains
   end subroutine watch
 
   !> Adds a collision to its series. A series consists of collisions at one and the same time that
-  !> are connected by common disks. Its first two collisions are added together.
+  !> are connected by common disks. The first two collisions of a series are added together.
   subroutine count_collision(sim, i, j, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j

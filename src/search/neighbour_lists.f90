@@ -3,19 +3,19 @@
 !>
 !> The neighbourhood of a disk is a square around the position at which its list was made, clipped
 !> at the faces of its cell and at the sides of the box. When the centre of the disk leaves this
-!> square, which is an event, its list expires: a new list and a new neighbourhood are made from the
-!> 3 x 3 cells around the disk. A prediction therefore tests only a few neighbours, however many
-!> disks the cells contain (Donev, Torquato and Stillinger, Journal of Computational Physics 202,
-!> 737 (2005)).
+!> square, which is an event, its list expires. A new list and a new neighbourhood are then made
+!> from the 3 x 3 cells around the disk. A prediction therefore tests only a few neighbours, however
+!> many disks the cells contain (Donev, Torquato and Stillinger, Journal of Computational Physics
+!> 202, 737 (2005)).
 !>
 !> Lists save time but do not change the results. A list without space for another neighbour is
 !> marked as incomplete. Until the disk receives a new list, its predictions search the 3 x 3 cells
 !> around it.
 !>
 !> If the radii differ so much that 3 x 3 cells contain very many disks, the disks with small
-!> neighbourhoods are also sorted into a second grid of narrow cells, by the centres of their
-!> neighbourhoods. A new list of such a disk then requires only a search of 3 x 3 narrow cells, and
-!> of 3 x 3 wide cells for the few disks with large neighbourhoods.
+!> neighbourhoods are also sorted into a second grid of narrow cells, according to the centres of
+!> their neighbourhoods. A new list of such a disk then requires only a search of 3 x 3 narrow
+!> cells, and of 3 x 3 wide cells for the few disks with large neighbourhoods.
 module neighbour_lists
   use, intrinsic :: iso_fortran_env, only: real32
   use kinds, only: int16, int32, int64, pi, real64

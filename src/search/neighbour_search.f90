@@ -53,18 +53,18 @@ contains
   !> either at `now` or not at all. Later predictions lead to the same decision: the shift of a disk
   !> is itself an event, after which its contacts are predicted anew.
   !>
-  !> The contact time s is the first root of |dx + dv s| = sigma. It is calculated as s =
+  !> The contact time s is the first root of |dx + dv s| = sigma. The root is calculated as s =
   !> c/(sqrt(disc) - b), with b = dx . dv and c = dx**2 - sigma**2, which avoids cancellation for
   !> disks close to contact. The discriminant is calculated as disc = sigma**2 dv**2 - (dx x dv)**2,
   !> which avoids cancellation for distant disks that graze each other. If two approaching disks
   !> touch, or overlap owing to rounding errors, they collide at `now`.
   !>
-  !> A single test excludes most candidates. It combines three conditions: the root must be real, it
-  !> must be earlier than the earliest contact found so far, and it must be earlier than the next
-  !> event of the candidate. (A later contact need not be predicted, because the pair is tested
-  !> again at that event.) If the root is earlier than a time t, then c < -2 b (t - late), where
-  !> `late` is the later clock of the two disks. This inequality is tested with a margin larger than
-  !> all rounding errors.
+  !> A single test excludes most candidates. The test combines three conditions: the root must be
+  !> real, it must be earlier than the earliest contact found so far, and it must be earlier than
+  !> the next event of the candidate. (A later contact need not be predicted, because the pair is
+  !> tested again at that event.) If the root is earlier than a time t, then c < -2 b (t - late),
+  !> where `late` is the later clock of the two disks. This inequality is tested with a margin
+  !> larger than all rounding errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices from 0
     type(tag_t), intent(in) :: tag(*)

@@ -87,8 +87,8 @@ contains
   contains
 
     !> Adds the obstacle to the lists in a block of cells. The block is halved recursively until it
-    !> is a single cell or is not crossed by the outline of the obstacle; in the latter case, disks
-    !> overlap the obstacle either at every position in the block or at none.
+    !> is a single cell or is not crossed by the outline of the obstacle. In a block that is not
+    !> crossed, disks overlap the obstacle at every position or at none.
     recursive subroutine enter_block(low, high)
       !> First and last column and row of the block, counted from 0. The block may extend beyond
       !> periodic sides.

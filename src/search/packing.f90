@@ -71,8 +71,8 @@ contains
     allocate (packing%disk(n_disks), packing%layer(n_species))
   end function empty_packing
 
-  !> Sets up the cells of a species. Their edge is the largest diameter of the species, or longer if
-  !> there are few disks.
+  !> Sets up the cells of a species. The edge of a cell is the largest diameter of the species, or
+  !> longer if the species has few disks.
   subroutine open_species(self, s, radius, count, lower, upper)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: s
@@ -279,9 +279,9 @@ contains
   end subroutine search_contact
 
   !> Finds a disk or an obstacle that excludes the centres of disks of the given radius from the
-  !> whole rectangle `centre` +- `half`; half = 0 tests whether a disk fits at the point `centre`.
-  !> `blocker` is the index of the disk, the boundary id of the obstacle (see `partners`), or 0 if
-  !> there is none.
+  !> whole rectangle `centre` +- `half`. With half = 0, this tests whether a disk fits at the point
+  !> `centre`. `blocker` is the index of the disk, the boundary id of the obstacle (see `partners`),
+  !> or 0 if there is none.
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]

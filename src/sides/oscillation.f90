@@ -75,8 +75,8 @@ module oscillation
     end function is_short
 
     !> Duration of the longest interval from the time tau on during which the gap to a disk of
-    !> acceleration g is a convex or a concave function of time. It ends when the acceleration of
-    !> the side equals g, or after half a period.
+    !> acceleration g is a convex or a concave function of time. The interval ends when the
+    !> acceleration of the side equals g, or after half a period.
     elemental function curvature_interval(self, tau, g) result(s)
       import :: oscillation_t, real64
       class(oscillation_t), intent(in) :: self
@@ -191,7 +191,7 @@ contains
   end function contact_time
 
   !> Time of contact in an interval in which the gap, as a function of time, is convex or concave;
-  !> `never` if there is no contact.
+  !> the result is `never` if there is no contact.
   pure function first_contact(self, tau, gap, disk, from, to) result(s)
     class(oscillation_t), intent(in) :: self
     real(real64), intent(in) :: tau, gap             !! as in `contact_time`

@@ -81,8 +81,8 @@ module side_motion
       real(real64) :: x
     end function value_at
 
-    !> Time until the side touches the rim of a disk that moves on a parabola; `never` if there is
-    !> no contact.
+    !> Time until the side touches the rim of a disk that moves on a parabola; the result is `never`
+    !> if there is no contact.
     pure function contact_time(self, tau, gap, v, g, state) result(s)
       import :: real64, side_motion_t, side_state_t
       class(side_motion_t), intent(in) :: self

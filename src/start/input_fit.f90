@@ -211,10 +211,11 @@ contains
   !> Upper bound of the packing fraction of disks in the plane. The bound also holds for a
   !> rectangular box, walled or periodic, because copies of the box fill the plane at the same
   !> packing fraction. For nearly equal radii it is the packing fraction of the triangular lattice
-  !> (Blind, Journal für die reine und angewandte Mathematik 236, 145, 1969). For other radii, let a
-  !> disk of the largest radius and two of the smallest touch each other: the bound is the packing
-  !> fraction in the triangle of their centres (Florian, Rendiconti del Circolo Matematico di
-  !> Palermo 9, 300, 1960). Both results are reviewed by Fernique (2021, arXiv:2107.14079).
+  !> (Blind, Journal für die reine und angewandte Mathematik 236, 145, 1969). For other radii,
+  !> consider a disk of the largest radius and two of the smallest that touch each other. The bound
+  !> is the packing fraction in the triangle of their centres (Florian, Rendiconti del Circolo
+  !> Matematico di Palermo 9, 300, 1960). Both results are reviewed by Fernique (2021,
+  !> arXiv:2107.14079).
   pure function densest_packing(ratio) result(most)
     real(real64), intent(in) :: ratio                         !! smallest radius divided by the largest
     real(real64) :: most
@@ -278,9 +279,9 @@ contains
   end subroutine check_strokes
 
   !> Determines whether the disks of a species rotate, and reads the number and radii of the disks
-  !> from an initial-configuration file unless the input contains both. If it does, an unreadable
-  !> file is not reported before the disks are placed, because a resumed run places no disks and
-  !> does not need the file.
+  !> from an initial-configuration file unless the input contains both. If the input contains both,
+  !> an unreadable file is not reported before the disks are placed, because a resumed run places no
+  !> disks and does not need the file.
   subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: k                                  !! index of the species

@@ -140,8 +140,8 @@ contains
     yes = candidates > candidates_that_pay - 27*packing
   end function are_listed
 
-  !> Hypothetical packing fraction if all disks had the radius that determines the cell width: the
-  !> largest radius of all species with at least a twentieth of the disks.
+  !> Packing fraction that the system would have if all disks had the radius that determines the
+  !> cell width. This is the largest radius of all species with at least a twentieth of the disks.
   pure function crowding(settings) result(fraction)
     type(settings_t), intent(in) :: settings
     real(real64) :: fraction, radius

@@ -1,4 +1,4 @@
-!> The table of all input variables. It is used for reading and checking the input, for
+!> The table of all input variables. The table is used for reading and checking the input, for
 !> `--print-defaults` and `--explain`, for the group `/parameters` of the output file, and for
 !> generating the reference page of the documentation.
 module variables
@@ -85,8 +85,8 @@ contains
     end do
   end function full_names
 
-  !> True if two variables of a group must not both be set. This includes two sampling intervals for
-  !> the same kind of samples.
+  !> True if two variables of a group must not both be set. Two sampling intervals for the same kind
+  !> of samples exclude each other, too.
   pure function excludes(one, other) result(yes)
     integer, intent(in) :: one, other        !! rows
     logical :: yes
