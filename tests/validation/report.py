@@ -11,26 +11,28 @@ from .case import Verdict
 
 HEAD = """# Physics validation
 
-This page is for researchers who want to know how far the numbers of the program can be trusted. It
-lists all physics cases with their reference values, measured values and verdicts. The command
-`python tests/validate.py --report docs/explanation/validation` writes the page. Each case runs the
-program on an input of its own and compares the result with an exact value, a derived formula or
-published numbers.
+How far can the numbers of the program be trusted? This page lists every physics case with its
+reference value, its measured value and a verdict, for researchers who rely on the results. Each
+case runs the program on its own input and compares the result with an exact value, a derived
+formula or published numbers. All values, with their tolerances, are in the file `validation.json`
+beside this page. Both files are written by
+`python tests/validate.py --report docs/explanation/validation`.
 
-The table has one row for each case. If a case has several values, the row contains the value that
-is closest to its tolerance. The *verdict* is the deviation from the reference divided by the
-tolerance: a value passes if its verdict is at most 1. A reference with ≤ or ≥ is a bound, and the
-verdict is 0 if the bound is satisfied. Values that must agree to rounding (1e-9 or better) have no
-rows; the row of their topic contains their number, and [the second
-table](#cases-that-agree-to-rounding) lists them. The file `validation.json` beside this page
-contains all values with their tolerances.
+The *verdict* is the deviation from the reference divided by the tolerance: a value passes if its
+verdict is at most 1. If the reference is a bound (≤ or ≥), the verdict is 0 if the bound is
+satisfied. The table has one row for each case. If a case has several values, the row shows the one
+that is closest to its tolerance. Values that must agree to rounding (1e-9 or better) are only
+counted, in the row of their topic; [the second table](#cases-that-agree-to-rounding) lists them.
 
-The column *source* names the origin of the reference. A *derived* reference follows from the model
-by a calculation; the modules in `tests/validation` contain its formula. A *reference program* is a
-separate program for hard disks, which shares no code with Ricochet and was written for these cases.
-*DSMC* is a direct simulation Monte Carlo solution of the Boltzmann equation. *Exam*, *lab* and
-*gravity exercise* are the texts of the [exercises](../tutorials/README.md). All other sources are
-publications.
+The column *source* names the origin of the reference:
+
+| source | meaning |
+|---|---|
+| derived | calculated from the model; the formula is in `tests/validation` |
+| reference program | another hard-disk program, written for these cases, without shared code |
+| DSMC | direct simulation Monte Carlo solution of the Boltzmann equation |
+| exam, lab, gravity exercise | texts of the [exercises](../tutorials/README.md) |
+| all others | publications |
 
 """
 
@@ -68,37 +70,56 @@ TOPICS = {
 NOTES = """
 ## Notes on single cases
 
-The notes concern references that are approximate, that differ from a publication, or that hold only
-under certain conditions. A number in parentheses is the standard error of the last digit.
+Some references are approximate, differ from a publication, or hold only under certain conditions.
+A number in parentheses is the standard error of the last digit.
 
 - **P6-03, relaxation of a mixture.** A published ratio of energies, 1.39(1) after 2 collisions per
-  disk, is too low. The ratio measured here is 1.468(6), or 1.485(11) with time steps, and 1.449(8)
-  in a dilute gas. The Boltzmann equation gives 1.455.
-- **P7-07, collision rates of a mixture.** The reference contains approximate contact values. To
-  first order in the density their errors at packing 0.1 are +0.26, +0.16 and -0.29 % for the pairs
-  11, 12 and 22. The measured deviations are +0.11(5), +0.14(7) and -0.45(6) %.
-- **P8-03, pressure of a dense fluid.** The table contains no case P8-03. Up to packing 0.70 the
+  disk, is too low. Other values of this ratio:
+
+  | method | ratio |
+  |---|---|
+  | measured here | 1.468(6) |
+  | measured here, time steps | 1.485(11) |
+  | measured here, dilute gas | 1.449(8) |
+  | Boltzmann equation | 1.455 |
+
+- **P7-07, collision rates of a mixture.** The reference is calculated with approximate contact
+  values of the pair distribution functions. The table compares their error, to first order in the
+  density at packing 0.1, with the measured deviation.
+
+  | pair | error of the contact value (%) | measured deviation (%) |
+  |---|---|---|
+  | 11 | +0.26 | +0.11(5) |
+  | 12 | +0.16 | +0.14(7) |
+  | 22 | -0.29 | -0.45(6) |
+
+- **P8-03, pressure of a dense fluid.** There is no case P8-03 in the table. Up to packing 0.70 the
   measured pressure agrees with Li et al. (2022) within its errors of 0.03 to 0.2 %.
 - **P8-05, pressure of the crystal.** The formula of the reference is accurate to 0.2 %.
 - **P9-07, TC model.** The theoretical fractions of elastic collisions are accurate to 0.01 up to
-  packing 0.1. At higher packing the same disks collide repeatedly: at packing 0.2 the fraction is
-  0.850 for w t_c = 1 (0.86 at low packing) and 0.612 for w t_c = 0.5 (0.62 at low packing). The
-  collision rate of a disk is denoted by w.
+  packing 0.1. In denser gases the same disks collide repeatedly. With the collision rate w of a
+  disk and the contact duration t_c, the fractions are:
+
+  | w t_c | low packing | packing 0.2 |
+  |---|---|---|
+  | 1 | 0.86 | 0.850 |
+  | 0.5 | 0.62 | 0.612 |
+
 - **P10-04, craters without the TC model.** Without the TC model a collapse occurs in all 12 runs
-  before a tenth of the energy is left. In 7 of them time no longer advances, and the run ends.
+  before the energy has fallen to a tenth. In 7 of them time no longer advances, and the run ends.
 - **P11-01, energy under gravity.** In the published table the centres of the disks start between R
-  and 8. In this program a disk lies completely inside its starting region, which therefore ends at
-  8 + R.
-- **P11-10, time steps.** The fraction of collisions that time steps miss is P(q) with q = g Δt / s,
-  where g is the relative speed, Δt the time step and s the sum of the radii. The argument is q and
-  not q / 2, because a collision is detected only while the disks approach each other, which is the
-  first half of the path on which they overlap.
+  and 8. In this program a disk lies completely inside its starting region, so that the region ends
+  at 8 + R.
+- **P11-10, time steps.** Time steps miss the fraction P(q) of the collisions, with q = g Δt / s,
+  the relative speed g, the time step Δt and the sum s of the radii. The argument is q and not
+  q / 2, because a collision is detected only while the disks approach each other, which they do
+  along the first half of the path on which they overlap.
 - **P12-06, diffusion in a Lorentz gas.** The density expansion of D_0/D has the coefficients -4/3,
-  -0.8775 and 4.519, which are quoted from memory: the papers of van Leeuwen and Weijland could not
+  -0.8775 and 4.519. They are quoted from memory: the papers of van Leeuwen and Weijland could not
   be consulted, and no published simulation was found. Two references are exact: the limit of low
   density, D_0 = 3v/(16nR) from the Boltzmann equation, and the mean free time of P12-05. The table
-  below compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs
-  of 10^6 events for each density). The first two terms agree with the measured values within their
+  compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs of
+  10^6 events for each density). The first two terms agree with the measured values within their
   errors up to n R^2 = 0.005. At n R^2 = 0.01 and above, the omitted terms are larger than the
   errors.
 
@@ -109,11 +130,11 @@ under certain conditions. A number in parentheses is the standard error of the l
   | expansion without its last term | 0.983 | 0.970 | 0.950 | 0.920 | 0.880 | 0.834 |
 
 - **P12-09, Lyapunov exponent of the stadium.** The value 0.43 is quoted from memory, because the
-  papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. Case P12-08
-  confirms the estimator: the exponent of an unstable path is known exactly. An independent program
-  for points (4000 paths of 2000 collisions) found 0.4292(5).
+  papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. The estimator
+  itself is confirmed by case P12-08, in which the exponent of an unstable path is known exactly. An
+  independent program for points (4000 paths of 2000 collisions) found 0.4292(5).
 - **P15-09, sheared inelastic gas.** The theory is linear in the stress, and its error grows with
-  the inelasticity. The columns contain the reduced shear rate, -P_xy and P_yy.
+  the inelasticity. The table lists the reduced shear rate, -P_xy and P_yy.
 
   | restitution ξ | theory | measured |
   |---|---|---|
@@ -121,16 +142,16 @@ under certain conditions. A number in parentheses is the standard error of the l
   | 0.8 | 0.475, 0.379, 0.826 | 0.490(1), 0.386(1), 0.818(1) |
 
 - **P15-13, Maxwell's demon.** The theoretical threshold, a floor velocity of 0.73, is derived for
-  many dilute grains. The 120 disks of this case distribute evenly between the chambers if the
-  velocity is about 0.65 or more. With 600 disks of a fifth of the diameter, most disks are still in
-  one chamber at 0.65.
-- **P15-20, effusion.** The theoretical rate applies to an opening that is much narrower than the
-  mean free path and than the chamber. The measured rate is 1.9(6) % higher if the opening is as
-  wide as 0.05 of the chamber, and 5.4(6) % higher if it is also 0.2 mean free paths wide.
-- **P15-21, discharge of a hopper.** The tolerance allows the values of the literature, k between 1
-  and 2. The values of k and of the exponent were each fitted with the other one fixed, because they
-  are strongly correlated. Smooth grains do not obey Beverloo's law: for 2000 smooth grains the
-  fitted exponent is 1.29(3), with k = 1.3(2).
+  many dilute grains. The 120 disks of this case distribute evenly between the chambers above a
+  velocity of about 0.65. With 600 disks of a fifth of the diameter, most disks are still in one
+  chamber at 0.65.
+- **P15-20, effusion.** The theoretical rate applies to an opening much narrower than the mean free
+  path and than the chamber. The measured rate is 1.9(6) % higher if the opening is as wide as 0.05
+  of the chamber, and 5.4(6) % higher if it is also 0.2 mean free paths wide.
+- **P15-21, discharge of a hopper.** The tolerance covers the values of the literature, k between 1
+  and 2. Since k and the exponent are strongly correlated, each was fitted with the other one fixed.
+  Smooth grains do not obey Beverloo's law: for 2000 smooth grains the fitted exponent is 1.29(3),
+  with k = 1.3(2).
 """
 
 
@@ -232,7 +253,7 @@ def outcome(cases: list[dict], seconds: float) -> str:
 ROUNDING = """
 ## Cases that agree to rounding
 
-The columns have the same meaning as in the first table. *Values* is the number of compared values.
+The columns are those of the first table, with the number of compared *values*.
 
 | case | quantity | values | source | tolerance | verdict |
 |---|---|---|---|---|---|
@@ -240,39 +261,42 @@ The columns have the same meaning as in the first table. *Values* is the number 
 BARS = """
 ## Error bars and p-values
 
-The tables of this section show how often the error bars of the scripts contain the true value. The
-command `python tests/coverage_tables.py` writes these tables. The systems and quantities were
-chosen before the first run. The seeds of the tables were not used to improve the estimators, with
-four exceptions: the first tables showed that the errors of the flow, of the slopes under gravity,
-of the coefficients from Helfand moments and of the thermalisation time were wrong. The rows of
-these quantities were measured again with corrected estimators. The rows of the Lyapunov exponent
-and of gases under gravity were repeated after the bias of the exponent and the equilibration had
-been changed. Curves of cooling gases against time are compared at one fixed time.
+Of 100 correct error bars, 68 contain the true value. The tables of this section, written by
+`python tests/coverage_tables.py`, show how many bars of the scripts do so. The systems and
+quantities were chosen before the first run, and the seeds of the tables were not used to improve
+the estimators. Some rows were measured again:
 
-An error bar belongs to a single run, or to a group of runs if the name of the system states a
-number of runs. The columns are:
+- The first tables showed that four errors were wrong: those of the flow velocity, of the slopes
+  under gravity, of the coefficients from Helfand moments and of the thermalisation time. Their rows
+  were measured again with corrected estimators.
+- The rows of the Lyapunov exponent and of gases under gravity were repeated after the bias of the
+  exponent and the equilibration had been changed.
 
-- *bars*: the number of runs or groups.
-- *coverage*: the percentage of the error bars that contain the true value, which is exact or the
-  mean over all bars. The expected value is 68 %, and 61 to 75 % are allowed. The percentage of n
-  bars has a standard deviation of 47 / √n by chance.
-- *error / scatter*: the mean error divided by the standard deviation of the measured values.
-  Errors with Student's t make this ratio larger than 1.
-- *three*: the coverage of means over three bars, whose errors follow from their scatter.
+Curves of cooling gases against time are compared at one fixed time. An error bar belongs to a
+single run, or to a group of runs if the name of the system states a number of runs. The columns
+are:
 
-Four rows of the craters are outside of the limits. The numbers of disks that a projectile as light
-as a disk hits or displaces have a skewed distribution (skewness 2.2). Four values of such a
-distribution often contain no large value; then their mean and their error are both too small. In
-random choices from 240 craters, 16 values have a coverage of 64 %, and 64 values one of 67 %. The
-exponents follow from these numbers, and their errors are too small for the same reason.
+- *bars*: number of runs or groups.
+- *coverage*: percentage of the error bars that contain the true value, which is either known
+  exactly or the mean over all bars. The expected value is 68 %, and 61 to 75 % are allowed. For n
+  bars the percentage has a standard deviation of 47 / √n by chance.
+- *error / scatter*: mean error divided by the standard deviation of the measured values. Errors
+  with Student's t make this ratio larger than 1.
+- *three*: coverage of means over three bars, whose errors follow from their scatter.
+
+Four rows of the craters are outside the limits. How many disks are hit or displaced by a projectile
+as light as a disk has a skewed distribution (skewness 2.2). Four values of such a distribution
+often include no large value; then both their mean and their error are too small. In random choices
+from 240 craters, the coverage is 64 % for 16 values and 67 % for 64 values. The exponents follow
+from these numbers, and their errors are too small for the same reason.
 
 | system | quantity | bars | coverage | error / scatter | three |
 |---|---|---|---|---|---|
 """
 P_VALUES = """
-The second table contains p-values of `speeds.py` for runs to which the tested law applies. Of 100
-p-values 5 should be below 0.05 and 32 below 0.32. *KS* is the Kolmogorov-Smirnov test of the
-speeds, and χ² is the χ² test. *Uniform* is the p-value of a Kolmogorov-Smirnov test of these
+The second table lists p-values of `speeds.py` for runs to which the tested law applies. Of 100
+p-values, 5 should be below 0.05 and 32 below 0.32. *KS* stands for the Kolmogorov-Smirnov test of
+the speeds, and χ² for the χ² test. *Uniform* is the p-value of a Kolmogorov-Smirnov test of these
 p-values against the uniform distribution. The seeds of the mixtures begin at 20001, all other seeds
 at 1001.
 
