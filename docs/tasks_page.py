@@ -25,51 +25,65 @@ Numbers = dict[str, tuple[float, float | None]]  # value and error (None without
 PAGES = ("exam", "gravity")
 TEXTS = {
     "mixture": """\
-Over eight seeds, light and heavy disks end with ⟨K⟩ = {K_light} and {K_heavy} (theory 1.25), and
-with ⟨v⟩ = {v_light} and {v_heavy} (theory {v_light_theory} and {v_heavy_theory}).
+Over eight seeds, the light disks end with ⟨K⟩ = {K_light} and the heavy disks with {K_heavy}
+(theory 1.25). Their mean speeds are {v_light} (theory {v_light_theory}) and {v_heavy} (theory
+{v_heavy_theory}).
 """,
     "cooling": """\
-After 20 collisions per disk the ratio of the temperatures, heavy over light, is {ratio_1} for ξ =
-1, {ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds). There is no equipartition for
-ξ < 1.
+After 20 collisions per disk the heavy disks are hotter than the light ones by the factor {ratio_1}
+for ξ = 1, {ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds). There is no
+equipartition for ξ < 1.
 """,
     "walls": """\
 After 20 collisions per disk K/K₀ is {left_velocity} with the walls of the exam and {left_normal}
 with smooth walls (ξ = 0.8, eight seeds).
 """,
     "crater": """\
-- In a bed of 2000 grains {hit} are hit, and {displaced} move by more than their radius. They come
-  from a region that is {width} wide and {depth} deep (eight beds).
+- *Size.* In a bed of 2000 grains {hit} are hit, and {displaced} move by more than their radius.
+  They come from a region {width} wide and {depth} deep (eight beds).
 - *Mass.* The number of hit grains grows with the mass of the projectile to the power {hit_mass}.
 - *Speed.* The number of hit grains grows with the speed to the power {hit_speed}. The crater does
   not depend on the speed.
-- *Radius.* In a sufficiently large bed the crater shrinks slowly with the radius of the projectile:
-  of 5000 grains 1043, 951 and 905 are hit for the radii 2, 5 and 10. In a smaller bed it grows with
-  the radius, because a small projectile reaches the floor and loses its energy there: of 1000
-  grains 537, 610 and 663 are hit. The figure shows only beds of 2000 grains. At its open points the
-  projectile loses energy at the floor in the same way, so that the crater grows with the radius.
-- *Size of the bed.* About 7.5 M (1/f - 1)/(1 - ξ²) grains are needed, where M is the mass ratio and
-  f the fraction of the energy that is left at the end. Here the estimate is 2250 grains. The
-  slightly smaller bed of 2000 grains is acceptable for these values, because fewer than 20
-  collisions with walls occur, the limit up to which the scripts include a crater in the fit (filled
-  symbols).
+- *Radius.* In a large bed the crater shrinks slowly with the radius of the projectile. In a small
+  bed it grows with the radius, because a small projectile reaches the floor and loses its energy
+  there. The same happens at the open points of the figure, which shows only beds of 2000 grains.
 - *Restitution.* As ξ approaches 1 the crater grows to the whole bed.
+
+| grains in the bed | hit with radius 2 | radius 5 | radius 10 |
+|---|---|---|---|
+| 5000 | 1043 | 951 | 905 |
+| 1000 | 537 | 610 | 663 |
+
+How large must the bed be? About 7.5 M (1/f - 1)/(1 - ξ²) grains are needed, where M is the mass
+ratio and f the fraction of the energy that is left at the end. Here the estimate is 2250 grains.
+The slightly smaller bed of 2000 grains is acceptable, because fewer than 20 collisions with walls
+occur. Up to this limit the scripts include a crater in the fit (filled symbols).
 """,
     "energy": """\
-The total energy of all methods is constant to {energy_change}. The time steps miss {missed_0.001}
-% of the collisions for dt = 0.001, {missed_0.002} % for 0.002 and {missed_0.004} % for 0.004; the
-formula gives {expected_0.001}, {expected_0.002} and {expected_0.004} % (32 pairs of runs of 520
-s).
+The total energy of all methods is constant to {energy_change}. The table lists the missed
+collisions in per cent (32 pairs of runs of 520 s).
+
+| dt | missed | formula |
+|---|---|---|
+| 0.001 | {missed_0.001} | {expected_0.001} |
+| 0.002 | {missed_0.002} | {expected_0.002} |
+| 0.004 | {missed_0.004} | {expected_0.004} |
 """,
     "equipartition": """\
 For the earliest of the four v₀, the mean energies of both species agree within 10 % from
 ({T_first}) s on, and for the latest from ({T_last}) s on. The time hardly depends on v₀.
 """,
     "laws": """\
-The slopes measured with seed 1, divided by those of the exponential laws, are {speed_A} and
-{speed_B} for v² of the species A and B, and {height_A} and {height_B} for their heights. The dashed
-lines are the laws for 60 disks of finite size with a fixed energy, whose slopes are {speed_law} for
-v², and {height_law_A} and {height_law_B} for the heights.
+The table lists slopes measured with seed 1, divided by those of the exponential laws. The dashed
+lines are the laws for 60 disks of finite size with a fixed energy, whose slopes differ slightly
+from 1.
+
+| histogram | measured | law for 60 disks |
+|---|---|---|
+| v², species A | {speed_A} | {speed_law} |
+| v², species B | {speed_B} | {speed_law} |
+| height, species A | {height_A} | {height_law_A} |
+| height, species B | {height_B} | {height_law_B} |
 """,
 }
 
@@ -147,6 +161,24 @@ def words(number: tuple[float, float | None]) -> str:
     return " ± ".join(rounded_to_error(mean, error))
 
 
+def wrapped(paragraph: str) -> str:
+    """Return a paragraph, a list or a table of a page, with lines of the width of the pages."""
+    if paragraph.startswith("|"):
+        return paragraph.strip() + "\n"
+    items = [" ".join(item.split()) for item in re.split(r"\n(?=- )", paragraph)]
+    lines = [
+        textwrap.fill(
+            item,
+            120,
+            subsequent_indent=2 * " " * (item[0] == "-"),
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        for item in items
+    ]
+    return "\n".join(lines) + "\n"
+
+
 def filled(page: str, numbers: Numbers) -> str:
     """Replace all texts of a page that contain results, and return the new page."""
     for name, template in TEXTS.items():
@@ -154,20 +186,9 @@ def filled(page: str, numbers: Numbers) -> str:
         if start not in page:
             continue
         text = BLANK.sub(lambda blank: words(numbers[blank[1]]), template)
-        items = [" ".join(item.split()) for item in re.split(r"\n(?=- )", text)]
-        wrapped = [
-            textwrap.fill(
-                item,
-                120,
-                subsequent_indent=2 * " " * (item[0] == "-"),
-                break_long_words=False,
-                break_on_hyphens=False,
-            )
-            + "\n"
-            for item in items
-        ]
         before, _, rest = page.partition(start)
-        page = before + start + "".join(wrapped) + end + rest.partition(end)[2]
+        parts = "\n".join(map(wrapped, text.split("\n\n")))
+        page = before + start + parts + end + rest.partition(end)[2]
     return page
 
 
