@@ -21,17 +21,16 @@ GROUPS = {
     "box": "The group `&box` sets the size of the box, its boundaries, gravity and shear "
     "([theory](../../explanation/theory.md#sheared-boxes)).",
     "side": "A group `&side` describes the motion of one side of the box that is a wall "
-    "([theory](../../explanation/theory.md#sides-that-move)). Its collision rule is described "
-    "under [boundaries](boundaries.md).",
-    "obstacle": "A group `&obstacle` describes a circular obstacle or an arc, or many of them from "
-    "a file, and may be repeated. Its collision rule is described under "
+    "([theory](../../explanation/theory.md#sides-that-move)). For its collision rule see "
     "[boundaries](boundaries.md).",
+    "obstacle": "A group `&obstacle` describes a circular obstacle or an arc, or many of them from "
+    "a file, and may be repeated. For its collision rule see [boundaries](boundaries.md).",
     "wall": "A group `&wall` describes a straight wall, a polyline, or many walls from a file, and "
-    "may be repeated. Disks bounce off both faces of a wall and off its end points. Its collision "
-    "rule is described under [boundaries](boundaries.md).",
+    "may be repeated. Disks bounce off both faces of a wall and off its end points. For its "
+    "collision rule see [boundaries](boundaries.md).",
     LAW: "The groups `&side`, `&obstacle` and `&wall` share these variables, which describe the "
-    "collisions of disks with one boundary. A boundary without them has the `wall_...` variables "
-    "of [`&contact`](contact.md).",
+    "collisions of disks with one boundary. For a boundary without them, the `wall_...` variables "
+    "of [`&contact`](contact.md) apply.",
     "species": "A group `&species` describes disks of one kind. It is repeated for each species, "
     "and an input file needs at least one "
     "([initial configurations](../../explanation/theory.md#starting-states)).",
@@ -40,14 +39,14 @@ GROUPS = {
     "drive": "The group `&drive` describes driving, which changes velocities at fixed intervals "
     "([theory](../../explanation/theory.md#kicks)).",
     "source": "A group `&source` lets waiting disks enter the box at regular times, and may be "
-    "repeated. Disks wait from the start (`waiting` of [`&species`](species.md)), or after they "
-    "have left the box through an open side (`open` of [`&side`](side.md)).",
+    "repeated. Disks wait from the start (`waiting` of [`&species`](species.md)), or after leaving "
+    "the box through an open side (`open` of [`&side`](side.md)).",
     "change": "A group `&change` describes a change of the system at a given time, and may be "
     "repeated ([changes during a run](../../guides/changes.md)).",
-    "stop": "The group `&stop` sets the rules that end the run, of which at least one is needed. "
-    "The run ends when the first of them is met. If no further event can occur and no `time` is "
-    "given, it ends at the last collision, or at the sample that is due after it.",
-    "output": "The group `&output` determines the contents of the output file, and the times of "
+    "stop": "The group `&stop` sets the rules that end the run. At least one is needed, and the "
+    "run ends when the first of them is met. If no further event can occur and no `time` is given, "
+    "it ends at the last collision, or at the next sample after it.",
+    "output": "The group `&output` determines the contents of the output file and the times of "
     "frames and samples. The initial and the final state are always written. Averages over samples "
     "at intervals of collisions or events differ from time averages by a relative amount of order "
     "1/N ([output](../output.md#observables)).",
@@ -72,18 +71,20 @@ EXAMPLES = {
 HEAD = """\
 # Input: every variable
 
-For everybody who writes an input file, these pages list all its variables.
-[input/README](../../input/README.md) explains the rules of the format and shows how to describe a
-system; [input/reference.nml](../../input/reference.nml) contains all variables. The command
-`ricochet --explain VARIABLE` prints the same text for one variable, and `--explain WORD` searches
-names, choices and explanations. `docs/input_page.py` generates these pages from the table in the
-program.
+Look up a variable of an input file here. [input/README](../../input/README.md) explains the format
+and shows how to describe a system; [input/reference.nml](../../input/reference.nml) contains all
+variables with their defaults. The command `ricochet --explain VARIABLE` prints the same text for
+one variable, and `--explain WORD` searches names, choices and explanations.
 
 A file consists of groups `&name ... /` with lines `variable = value`. Only values that differ from
-the default are needed. On the command line `--set GROUP.VARIABLE=VALUE` replaces a value. A
-species, an obstacle or a wall is addressed by its name, as in `--set species.projectile.mass=50`,
-and one element of a vector by its number, as in `--set 'box.gravity(2)=-5'`. The input file
-determines the units of length, time and mass ([units](../explanation/glossary.md#units)).
+the default are needed. The input file determines the units of length, time and mass
+([units](../explanation/glossary.md#units)). On the command line `--set` replaces a value:
+
+| option | replaces |
+|---|---|
+| `--set GROUP.VARIABLE=VALUE` | a variable of a group |
+| `--set species.projectile.mass=50` | a variable of a species, an obstacle or a wall, by its name |
+| `--set 'box.gravity(2)=-5'` | one element of a vector, by its number |
 
 For each variable a table lists the allowed values with their unit, the default, and an example if
 there is no default. Three more rows appear where they apply:
@@ -94,6 +95,8 @@ there is no default. Three more rows appear where they apply:
 - *may change*: on `--resume` (variables without an effect on the trajectory), or while a
   simulation runs (by `&change`, in Python and on the laboratory page). All other variables are
   fixed during a run.
+
+`docs/input_page.py` generates these pages from the table in the program.
 
 ## Groups
 

@@ -19,8 +19,8 @@ ROOT = Path(__file__).resolve().parents[1]
 C_HEAD = """\
 # C interface
 
-This page is the reference for programs in C, or in any language that can call C, which contain the
-engine as a library. `make library` builds `build/libricochet.so` and `build/libricochet_files.so`;
+Programs in C, or in any language that can call C, can contain the engine as a library.
+`make library` builds `build/libricochet.so` and `build/libricochet_files.so`.
 `docs/reference_pages.py` generates this page from the header `ricochet.h`.
 
 ## Example
@@ -29,9 +29,9 @@ engine as a library. `make library` builds `build/libricochet.so` and `build/lib
 INPUTS_HEAD = """\
 # Inputs
 
-This page is a gallery of the files in `input/`, for everybody who looks for an experiment to start
-from. Each file is ready to run, and its comments explain the settings. A picture shows the
-simulation at one time; `make lab` shows the motion. `docs/reference_pages.py` generates this page.
+Choose an experiment to start from: each file in `input/` is ready to run, and its comments explain
+the settings. The pictures show the simulations at one time; `make lab` shows them in motion.
+`docs/reference_pages.py` generates this page.
 
 """
 
