@@ -1,7 +1,7 @@
 /* Memory functions that Fortran does not provide: hints, which affect only the speed and the memory use of a run, and
-   an error message when no memory is left. The code depends on the compiler, the linker and the operating system. If
-   the macro MEMORY_HINTS is not defined (see HINTS in the Makefile), the functions in this file have no effect, and a
-   failed `allocate` leads to the error message of the Fortran run-time library. */
+   an error message when memory is exhausted. The code depends on the compiler, the linker and the operating system. If
+   the macro MEMORY_HINTS is undefined (see HINTS in the Makefile), the functions do nothing, and after a failed
+   `allocate` the Fortran run-time library prints its own error message. */
 #include <stdint.h>
 
 #ifdef MEMORY_HINTS
@@ -17,9 +17,8 @@
 
 static const size_t line = 64, large = 128*1024, page = 2*1024*1024;
 
-/* Checks the result of every memory allocation, including those of temporary arrays. If no memory is left, the function
-   prints an error message and ends the program with exit code 3. Data that have already been committed to files stay
-   valid. */
+/* Checks every memory allocation, including those of temporary arrays. If memory is exhausted, an error message is
+   printed and the program ends with exit code 3. Data already committed to files remain valid. */
 static void *obtained(void *memory, size_t bytes)
 {
     if (!memory && bytes) {
@@ -34,9 +33,9 @@ static void *obtained(void *memory, size_t bytes)
 }
 
 /* Aligns large arrays to cache lines, so that a record of 64 bytes occupies a single line. Arrays of at least 2 MB are
-   placed on huge pages if the system provides huge pages, because the TLB (the cache of page addresses) can hold only
-   few pages. The linker option --wrap=malloc redirects all calls of malloc to this function, because the Fortran
-   statement `allocate` cannot control alignment or page size. */
+   placed on huge pages if the system provides them, because the TLB (the cache of page addresses) has room for only a
+   few pages. The Fortran statement `allocate` cannot control alignment or page size; therefore the linker option
+   --wrap=malloc redirects all calls of malloc to this function. */
 void *__real_malloc(size_t bytes);
 __attribute__((used)) void *__wrap_malloc(size_t bytes)
 {

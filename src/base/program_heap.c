@@ -1,7 +1,7 @@
-/* Fixes the size above which the C library allocates an array by a separate memory mapping instead of on the heap. By
-   default the C library increases this size during a run. Large arrays that are allocated repeatedly would then
-   fragment the heap, and the memory use of a long run would grow without limit. Only the program contains this file:
-   in the shared libraries the heap belongs to the program that has loaded them. */
+/* Fixes the size above which the C library allocates an array in a memory mapping of its own instead of on the heap. By
+   default the C library increases this size during a run. Large arrays allocated again and again would then fragment
+   the heap, and the memory use of a long run would grow without limit. The file is linked into the program but not into
+   the shared libraries, whose heap belongs to the program that loads them. */
 #if defined(MEMORY_HINTS) && defined(__linux__)
 #include <malloc.h>
 #ifdef M_MMAP_THRESHOLD

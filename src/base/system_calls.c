@@ -1,6 +1,6 @@
 /* System calls that need constants, structures or the variable errno from C headers (POSIX, flock, CPU affinity). The
-   Fortran interfaces of these functions are in system.f90. A function that fails returns -1 and stores the reason in
-   errno. */
+   Fortran interfaces of these functions are in system.f90. After a failure, a function returns -1 and errno
+   contains the reason. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -29,12 +29,11 @@ double system_seconds(void)
     return (double)now.tv_sec + 1e-9*(double)now.tv_nsec;
 }
 
-/* All variables that the signal handler writes. The variables are atomic, because the signal handler may run in any
-   thread. */
+/* All variables written by the signal handler; atomic, because the handler may run in any thread. */
 static atomic_int stop_signal, checkpoint_signals;
 static _Atomic double first_stop_at;
 
-/* Exit code and message with which the program ends immediately after a stop signal while no data can be lost. */
+/* Exit code and message of the program if a stop signal ends it immediately, while no data can be lost. */
 static struct {
     atomic_bool at_once;  /* false while data could be lost */
     int code;
@@ -47,10 +46,10 @@ static void end_at_once(void)
     _exit(ending.code);
 }
 
-/* Signal handler. While no data can be lost, a stop signal ends the program immediately. While data could be lost, the
-   first stop signal is only recorded, and the main loop ends the run. Job launchers often send a signal twice within a
-   fraction of a second. A further stop signal therefore ends the program immediately only if it arrives more than half
-   a second after the first stop signal. */
+/* Signal handler. While no data can be lost, a stop signal ends the program immediately. Otherwise the first stop signal
+   is only recorded, and the main loop ends the run. A second stop signal ends the program immediately if it arrives
+   more than half a second after the first; the delay is needed because job launchers often send a signal twice within
+   a fraction of a second. */
 static void note_signal(int number)
 {
     const double moments = 0.5;
@@ -82,8 +81,8 @@ void system_watch_signals(void)
 
 void system_record_signals(void) { ending.at_once = false; }
 
-/* From this call on, a stop signal ends the program immediately. A stop signal that was recorded before this call ends
-   the program in this call. */
+/* From this call on, a stop signal ends the program immediately. If a stop signal was recorded earlier, this call ends
+   the program. */
 void system_end_at_signals(const char *message, int code)
 {
     system_record_signals();
@@ -120,9 +119,9 @@ void system_fill_standard_streams(void)
 
 bool system_talks_to_terminal(void) { return isatty(STDERR_FILENO) == 1; }
 
-/* Writes a text to standard output completely, even if standard output is a pipe that accepts only a part of the bytes
-   in each call. If a pipe repeatedly reports that it is ready but refuses data, the rest of the text is discarded
-   without an error. */
+/* Writes a whole text to standard output, even if standard output is a pipe that accepts only part of the bytes in each
+   call. If a pipe repeatedly reports that it is ready but accepts no data, the rest of the text is discarded without an
+   error. */
 int system_print(const char *bytes)
 {
     size_t count = strlen(bytes);
@@ -143,7 +142,7 @@ int system_print(const char *bytes)
     return 0;
 }
 
-/* A resource limit of the process, as shown by `ulimit`; INT64_MAX if the resource is not limited. */
+/* Resource limit of the process, as displayed by `ulimit`; INT64_MAX for an unlimited resource. */
 static int64_t limit_of(int resource)
 {
     struct rlimit limit;
@@ -153,8 +152,8 @@ static int64_t limit_of(int resource)
 
 int64_t system_largest_file(void) { return limit_of(RLIMIT_FSIZE); }
 
-/* Reason for the last failure of a system call. If too many files are open, the text also contains the limit of open
-   files and the option of `ulimit` that raises this limit. */
+/* Reason for the last failure of a system call. If too many files are open, the text also states the limit and the
+   option of `ulimit` that raises it. */
 void system_describe_problem(char *text, size_t size)
 {
     const int problem = errno;
@@ -172,14 +171,14 @@ void system_name_host(char *text, size_t size)
 
 /* --- Files --- */
 
-/* Opens a file whose name was chosen by the user. The other functions of this module open such files only through this
-   function. The function does not wait if the file is a named pipe (O_NONBLOCK). */
+/* Opens a file whose name was chosen by the user. All other functions of this file open such files by calling this
+   one. It does not wait if the file is a named pipe (O_NONBLOCK). */
 static int open_file(const char *path, int flags)
 {
     return open(path, flags | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
 }
 
-/* Closes a file without changing errno, and returns the given status, so that the caller can return the result
+/* Closes a file without changing errno. The given status is returned, so that the caller can return the result
    directly. */
 static int closed(int descriptor, int status)
 {
@@ -189,9 +188,9 @@ static int closed(int descriptor, int status)
     return status;
 }
 
-/* Opens an existing regular file. A file with a second name (a symbolic or hard link) is not opened for writing,
-   because the write could change a file that does not belong to the run. If the file cannot be opened, the function
-   returns -1 and stores the reason in `problem`. */
+/* Opens an existing regular file. A file with several names (symbolic or hard links) is not opened for writing, because
+   writing could change a file that does not belong to the run. If the file cannot be opened, the result is -1 and
+   `problem` contains the reason. */
 static int open_regular(const char *path, int flags, const char **problem)
 {
     struct stat file;
@@ -212,7 +211,7 @@ static int open_regular(const char *path, int flags, const char **problem)
     return -1;
 }
 
-/* Reason why a file cannot be opened for reading or, with `writable`, for writing; empty if the file can be opened. */
+/* Reason why a file cannot be opened for reading or, with `writable`, for writing; empty if it can. */
 void system_opening_problem(const char *path, bool writable, char *text, size_t size)
 {
     const char *problem;
@@ -222,8 +221,8 @@ void system_opening_problem(const char *path, bool writable, char *text, size_t 
     text[size - 1] = '\0';
 }
 
-/* Reads the first `count` bytes of a file. Returns the number of bytes read, which is smaller than `count` if the file
-   is shorter, or -1 after a failure. */
+/* Reads the first `count` bytes of a file. Returns the number of bytes read, which is less than `count` for a shorter
+   file, or -1 after a failure. */
 int64_t system_read_bytes(const char *path, char *bytes, int64_t count)
 {
     const char *problem;
@@ -255,8 +254,8 @@ int system_find_folder(const char *path)
     return stat(path, &found) == 0 && S_ISDIR(found.st_mode) ? 0 : -1;
 }
 
-/* Kind of the object that a path names, as an index of `kinds_of_files` in system.f90. Symbolic links are not followed.
-   The result `nothing` is returned only if it is certain that no object with this path exists. */
+/* Kind of the object at a path, as an index into `kinds_of_files` in system.f90. Symbolic links are not followed. The
+   result is `nothing` only if the path certainly does not exist. */
 int system_what_is(const char *path)
 {
     enum { nothing = 1, file, folder, symbolic_link, pipe_or_device, hidden };
@@ -267,7 +266,7 @@ int system_what_is(const char *path)
          : S_ISLNK(found.st_mode) ? symbolic_link : pipe_or_device;
 }
 
-/* Inode, size and change time [ns] of a file; links are not followed. */
+/* Inode, size and change time [ns] of a file. Symbolic links are not followed. */
 void system_identify(const char *path, int64_t identity[3])
 {
     struct stat found = {0};
@@ -284,8 +283,8 @@ int64_t system_file_size(const char *path)
     return stat(path, &found) == 0 ? (int64_t)found.st_size : -1;
 }
 
-/* Waits until a file or folder is stored on the disk. Two failures of system calls do not count as errors: some file
-   systems cannot synchronize a folder (EINVAL), and a folder can be writable but not readable (EACCES). */
+/* Waits until a file or folder is stored on disk. Two failures are not considered errors: some file systems cannot
+   synchronise a folder (EINVAL), and a folder can be writable but not readable (EACCES). */
 int system_synchronize(const char *path)
 {
     const int descriptor = open_file(path, O_RDONLY);
@@ -293,8 +292,7 @@ int system_synchronize(const char *path)
     return closed(descriptor, fsync(descriptor) == 0 || errno == EINVAL ? 0 : -1);
 }
 
-/* Creates a folder. The function also succeeds if the folder already exists, because another process may just have
-   created the folder. */
+/* Creates a folder. It is no error if the folder exists, because another process may have just created it. */
 int system_make_folder(const char *path)
 {
     return mkdir(path, 0777) == 0 || errno == EEXIST ? 0 : -1;
@@ -307,16 +305,16 @@ int64_t system_free_bytes(const char *folder)
     return (int64_t)disk.f_frsize*(int64_t)disk.f_bavail;
 }
 
-/* Whether a path is the name of an open file. */
+/* True if a path is the name of an open file. */
 static bool is_name_of(const char *path, const struct stat *file)
 {
     struct stat named;
     return lstat(path, &named) == 0 && named.st_dev == file->st_dev && named.st_ino == file->st_ino;
 }
 
-/* Acquires a lock file. Returns a file descriptor, or one of the negative numbers of the enumeration below, which
-   system.f90 defines again. A lock file of a run is an empty regular file without a second name; any other file is
-   `foreign`. A lock file to which the user has no write permission belongs to a run of another user and is `taken`. */
+/* Acquires a lock file. Returns a file descriptor, or one of the negative numbers of the enumeration below, which are
+   also defined in system.f90. The lock file of a run is an empty regular file with a single name; any other file is
+   `foreign`. A lock file without write permission belongs to a run of another user and is `taken`. */
 int system_lock(const char *path)
 {
     enum { taken = -1, without_locks = -2, foreign = -3, failed = -4 };
@@ -330,15 +328,15 @@ int system_lock(const char *path)
         if (descriptor < 0) return exists && errno == EACCES ? taken : failed;
         if (flock(descriptor, LOCK_EX | LOCK_NB) != 0)
             return closed(descriptor, errno == EWOULDBLOCK ? taken : without_locks);
-        /* The run that held the lock before may have removed the file in the meantime. A lock on a removed file would
-           have no effect, because other runs would create a new file. */
+        /* The previous holder of the lock may have deleted the file meanwhile. A lock on a deleted file would have no
+           effect, because other runs would create a new file. */
         if (is_name_of(path, &file)) return descriptor;
         close(descriptor);
     }
     return taken;
 }
 
-/* Releases the lock, and removes the lock file unless the path now names a different file. */
+/* Releases the lock and deletes the lock file, unless the path is now the name of a different file. */
 void system_unlock(const char *path, int descriptor)
 {
     struct stat file;

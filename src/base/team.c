@@ -1,9 +1,8 @@
-/* A barrier for threads that reach the barrier thousands of times per second, on cores that other programs may also
-   use. A thread waits in a loop (spins) if its recent waits were short; if its recent waits were long, the thread
-   sleeps. If the cores are otherwise idle, no time is lost. If the cores are busy, no thread uses up its time slice
-   while it waits for a thread that is not running. The barriers of OpenMP either spin for milliseconds each time or
-   never, depending on environment variables that are read when the program starts. The Fortran interfaces of this
-   barrier are in team.f90. */
+/* A barrier that threads reach thousands of times per second, on cores that may be shared with other programs. A thread
+   spins (waits in a loop) if its recent waits were short, and sleeps if they were long. On otherwise idle cores no time
+   is lost; on busy cores no thread wastes its time slice waiting for a thread that is not running. OpenMP barriers, in
+   contrast, spin either for milliseconds each time or never, depending on environment variables read at the start of
+   the program. The Fortran interfaces of the barrier are in team.f90. */
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -12,8 +11,8 @@
 double system_seconds(void);
 
 struct barrier {
-    atomic_int threads; /* number of threads that have joined */
-    atomic_int arrived; /* number of threads that have arrived in this round */
+    atomic_int threads; /* number of registered threads */
+    atomic_int arrived; /* number of threads that arrived in this round */
     atomic_int round;
     pthread_mutex_t lock;
     pthread_cond_t released;
@@ -63,8 +62,8 @@ static void wait_for_release(struct barrier *self, int round)
     usual_wait += ((waited < 2*longest_spin ? waited : 2*longest_spin) - usual_wait)/8;
 }
 
-/* Returns true immediately for the last thread that arrives. For all other threads the function returns false after the
-   last thread has called barrier_release. */
+/* Returns true, without waiting, to the last thread that arrives. All other threads wait until the last one has called
+   barrier_release; the function then returns false. */
 bool barrier_arrive(struct barrier *self)
 {
     const int round = self->round;
@@ -79,6 +78,6 @@ void barrier_release(struct barrier *self)
     pthread_mutex_lock(&self->lock);
     self->round++;
     pthread_mutex_unlock(&self->lock);
-    /* The broadcast follows the unlocking, so that a thread that wakes up does not have to wait for the lock. */
+    /* broadcast after unlocking, so that a thread waking up need not wait for the lock */
     pthread_cond_broadcast(&self->released);
 }

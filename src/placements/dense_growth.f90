@@ -235,7 +235,7 @@ contains
     class(growth_t), intent(inout) :: self
     integer, intent(in) :: length                       !! number of collisions per disk
     type(limits_t) :: limits
-    integer(int64) :: to_come                           ! remaining number of collisions, twice for each pair
+    integer(int64) :: to_come                           ! remaining collisions, summed over the disks
     integer(int32) :: i
 
     associate (sim => self%sim)

@@ -21,8 +21,7 @@ module random_placement
 
   !> Maximum of the number of attempts to place a species times the number of its disks.
   integer(int32), parameter :: many_trials = 500000
-  !> Additive constant of the estimate that if one attempt placed n disks, another will place at
-  !> most nearly*n + few.
+  !> If an attempt placed n disks, another attempt is expected to place at most nearly*n + few.
   integer(int32), parameter :: few = 5
   real(real64), parameter :: nearly = 1.25_real64  !! factor of n in this estimate
   !> Minimum ratio of the packing fractions reached by 'dense' and by 'random' placement.
