@@ -71,7 +71,7 @@ contains
   !> deallocated.
   function begin(session, threads, error) result(handle)
     type(session_t), pointer, intent(inout) :: session
-    !> Number of threads; 0 for the number in the input, or one without it.
+    !> Number of threads; 0 for the number in the input, which is one by default.
     integer(c_int), intent(in) :: threads
     type(error_t), allocatable, intent(in) :: error
     type(c_ptr) :: handle

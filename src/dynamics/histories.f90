@@ -33,8 +33,8 @@ module histories
     integer(int32) :: deep_low(2) = 0, deep_high(2) = 0
     !> Range of columns and rows of the cells whose eight neighbours are all in the extended domain.
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0
-    !> 1 for each cell outside the domain that an owned disk has reached, and for its eight
-    !> neighbours; 0 elsewhere; indices from 0.
+    !> Flags of the cells, with indices from 0: 1 for each cell outside the domain that an owned
+    !> disk has reached, and for its eight neighbours, otherwise 0.
     integer(int8), allocatable :: reached(:, :)
     !> Whether an owned disk has reached the edge of the extended domain.
     logical :: left_patch = .false.
@@ -193,7 +193,7 @@ contains
     end do
   end subroutine reach
 
-  !> Whether a cell is in a rectangle.
+  !> True if a cell is in a rectangle.
   pure function within(cell, low, high) result(yes)
     integer(int16), intent(in) :: cell(2)
     integer(int32), intent(in) :: low(2), high(2)
@@ -202,7 +202,7 @@ contains
     yes = cell(1) >= low(1) .and. cell(1) <= high(1) .and. cell(2) >= low(2) .and. cell(2) <= high(2)
   end function within
 
-  !> Whether a cell belongs to the domain.
+  !> True if a cell belongs to the domain.
   pure function owns(self, cell) result(yes)
     class(histories_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -211,7 +211,7 @@ contains
     yes = within(cell, self%own_low, self%own_high)
   end function owns
 
-  !> Whether the domain owns disk i.
+  !> True if the domain owns disk i.
   pure function is_own(self, i) result(yes)
     class(histories_t), intent(in) :: self
     integer(int32), intent(in) :: i

@@ -522,8 +522,8 @@ contains
     if (element > 0) name = name(:bracket - 1)
   end subroutine split_element
 
-  !> Removes a sampling interval of another kind, set in the file for the same samples, if an
-  !> override sets a sampling interval. The override thereby replaces the interval in the file.
+  !> If an override sets a sampling interval, removes any interval of another kind that the file
+  !> sets for the same samples. The override thereby replaces the interval in the file.
   subroutine replace_cadence(self, g, name)
     class(reader_t), intent(inout) :: self
     integer, intent(in) :: g                            !! index of the group

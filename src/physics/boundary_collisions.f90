@@ -98,7 +98,7 @@ contains
       ! rounding errors would separate it from a disk at rest.
       side%position = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
         (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
-      ! despite rounding, not faster than the disk
+      ! rounding errors must not make the piston faster than the disk
       side%velocity = min(v - given, dot_product(disk%v, normal))
       side%clock = t
       u = u + (0.5_real64*(side%velocity - v))*normal

@@ -59,7 +59,8 @@ contains
     call bounds(box, at, low, high)
     inset = merge(0.0_real64, radius, spans(region, box))
     lower = max(region([1, 3]), low) + inset
-    upper = max(min(region([2, 4]), high) - inset, lower)    ! despite rounding, not below `lower`
+    ! rounding errors must not put `upper` below `lower`
+    upper = max(min(region([2, 4]), high) - inset, lower)
   end subroutine centre_range
 
   !> Time when a disk touches a wall, or its centre reaches a periodic or open side. A gap made

@@ -9,7 +9,7 @@ module features
   type :: features_t
     logical :: own_sizes = .false.      !! whether disks have individual masses and radii
     logical :: rotation = .false.       !! whether disks can rotate
-    logical :: orientation = .false.    !! whether disks have an orientation, as all disks that can rotate
+    logical :: orientation = .false.    !! whether disks have an orientation; always with rotation
     !> Whether the stress tensor and the event log include momentum changes.
     logical :: stress = .false.
     logical :: helfand = .false.        !! whether the Helfand moments are accumulated

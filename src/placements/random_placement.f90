@@ -24,7 +24,7 @@ module random_placement
   !> If an attempt placed n disks, another attempt is expected to place at most nearly*n + few.
   integer(int32), parameter :: few = 5
   real(real64), parameter :: nearly = 1.25_real64  !! factor of n in this estimate
-  !> Minimum ratio of the packing fractions reached by 'dense' and by 'random' placement.
+  !> Minimum ratio between the packing fractions that 'dense' and 'random' placement can reach.
   real(real64), parameter :: denser = 1.5_real64
   !> Packing fraction at which random sequential insertion saturates.
   real(real64), parameter :: saturation = 0.547_real64

@@ -227,8 +227,8 @@ contains
 
     do row = near%cell - cells%stride, near%cell + cells%stride, cells%stride
       do c = row - 1, row + 1
-        ! The first disk of a linked list is also in a slot, and is already a candidate unless
-        ! `gather` left it out.
+        ! The first disk of a linked list is also in a slot. It is therefore already a candidate,
+        ! unless `gather` left it out.
         j = cells%chain(c)
         if (j > 0 .and. c /= near%cell) j = cells%next(j)
         do while (j > 0)

@@ -1,5 +1,5 @@
 !> Detects inelastic collapses, in which an unbounded number of collisions occurs in a finite time,
-!> and counts collisions at exactly the same time.
+!> and counts simultaneous collisions, which occur at exactly the same time.
 !>
 !> A collision may be part of a collapse if the gap between the two disks was negligible even before
 !> they approached each other. The simulation alone cannot decide this: near a limit of collapse,
@@ -266,8 +266,8 @@ contains
       contact%sliding = contact%normal(2)*dv(1) - contact%normal(1)*dv(2)
       associate (p => sim%disk(member(a)), q => sim%disk(member(b)))
         contact%slip = -contact%sliding - p%radius*sim%spin(member(a)) - q%radius*sim%spin(member(b))
-        ! Rounding errors of a common velocity, or of a fall, must not end the collapse of a
-        ! straight row.
+        ! A row of disks may move as a whole or fall; rounding errors of this common motion must not
+        ! end its collapse.
         noise = spacing(maxval(abs([p%v, q%v]))) + magnitude(dv)/distance*spacing(maxval(abs([p%x, q%x])))
         if (abs(contact%sliding) <= resolved*noise) contact%sliding = 0
       end associate

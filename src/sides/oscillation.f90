@@ -15,8 +15,8 @@ module oscillation
   private
   public :: gap_after, negligible, oscillation_t
 
-  !> Duration of a negligible time interval, as a fraction of the period. An acceleration that lasts
-  !> no longer changes the gap by less than its rounding error.
+  !> Duration of a negligible time interval, as a fraction of the period. An acceleration during a
+  !> shorter time changes the gap by less than its rounding error.
   real(real64), parameter :: negligible = 1.0e-10_real64
   !> Number of successive intervals from `curvature_interval` that cover at least one period of the
   !> motion, even if some of them are negligibly short.
