@@ -1,7 +1,7 @@
 #!/bin/sh
 
-# Writes a Fortran module with the origin of the program (commit, compiler and flags), which `--version` prints.
-# The arguments of the script are the flags of the compiler.
+# Writes a Fortran module that describes how the program was built (commit, compiler and flags), for `--version`.
+# The arguments are the compiler flags.
 
 # shellcheck disable=SC2016 # `make dist` puts the commit here
 commit='$Format:%h$'

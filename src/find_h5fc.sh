@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 
-# Prints the path of the HDF5 compiler for Fortran (h5fc) that the Makefile uses. The script takes the first h5fc on PATH, or
-# otherwise /usr/bin/h5fc, with which a program that uses HDF5 compiles and runs. The h5fc of a conda environment, for example, can
-# name a compiler that is not installed. If no h5fc works, the script prints "h5fc" and its exit status is 1.
+# Prints the path of the HDF5 compiler for Fortran (h5fc) for the Makefile. The candidates are all h5fc on PATH and then
+# /usr/bin/h5fc; the first one is used with which an HDF5 program compiles and runs. The h5fc of a conda environment, for
+# example, may call a compiler that is not installed. If no h5fc works, the script prints "h5fc" and exits with status 1.
 set -u
 mapfile -t candidates < <(type -ap h5fc)
-# The h5fc of the system is not tested, because the test takes as long as everything else that make does before it compiles.
+# The h5fc of the system is not tested, because the test would double the time that make needs before it compiles.
 case ${candidates[0]:-} in /usr/bin/h5fc | /bin/h5fc) echo h5fc && exit ;; esac
 folder=$(mktemp -d) || exit
 trap 'rm -rf -- "$folder"' EXIT

@@ -1,5 +1,6 @@
-# Who uses whom, for make: `x.o: y.mod` for every `use y` in x.f90 or x.pf, `x.o: y.o` for a submodule x of y, and the list
-# of objects that need no HDF5. Objects of src/ go to one folder, all others to another.
+# Writes the dependences between sources for make: `x.o: y.mod` for every `use y` in x.f90 or x.pf, `x.o: y.o` for a
+# submodule x of y, and the list of objects that do not require HDF5. Objects of src/ are in one folder, all others in
+# another.
 # usage: awk -v build=FOLDER -v tests=FOLDER -f src/modules.awk FILE...
 FNR == 1 {
   me = FILENAME

@@ -1,10 +1,10 @@
-# Functions that show the progress of long commands, for the Makefile and for .ci/set-up. On a terminal a line of progress
+# Functions that display the progress of long commands, for the Makefile and for .ci/set-up. On a terminal each line
 # replaces the previous one.
 # shellcheck shell=sh
 
 on_terminal() { [ -t 1 ] && [ "${TERM:-dumb}" != dumb ]; }
 
-# announce TEXT COMMAND...: prints TEXT, runs COMMAND, and prints every five seconds that it still runs.
+# announce TEXT COMMAND...: prints TEXT, runs COMMAND, and reports every five seconds that it is still running.
 announce() {
   announced=$1 self=$$
   shift
@@ -28,8 +28,8 @@ announce() {
   return "$status"
 }
 
-# count LIST TOTAL VERB FILE: prints "VERB n of TOTAL: FILE", where n is the number of calls since the file LIST was emptied. If
-# TOTAL is empty, the total is not known.
+# count LIST TOTAL VERB FILE: prints "VERB n of TOTAL: FILE", where n is the number of calls since the file LIST was
+# emptied. An empty TOTAL means that the total is unknown.
 count() {
   echo "$4" >>"$1"
   line="$3 $4"
