@@ -2,19 +2,23 @@
 
     python post/cooling.py runs/cooling/*.h5 -o cooling.png --csv cooling.csv
 
-Runs with the same coefficient of restitution xi are combined; lines are means over the runs.  With
-fewer than four runs, the scatter of single runs is estimated from the numbers of disks.
+Runs with the same coefficient of restitution xi are combined, and lines are means over these runs.
+With fewer than four runs, the scatter of single runs is estimated from the numbers of disks.
 
 panels
   energy1, energy2, ...    energies per disk for each xi; bands contain 95 % of single runs
-  time, collisions         energies of all xi over the initial mean; bands: errors of the means
-  ratio                    temperature ratio of the heaviest and the lightest species
+  time, collisions         energies for all xi, divided by the initial mean, against time and
+                           against collisions per disk; bands: errors of the means
+  ratio                    temperature of the heaviest over that of the lightest species
 
 table (a row for each restitution)
-  energy_left          mean energy at the end over that at the start
-  temperature_ratio    at the end; 1 in equilibrium
-  flow_share           share of the energy in flows; if it is large, the gas is not homogeneous
-  --csv: all curves, reduced against collisions per disk and in units of the input against time
+  energy_left          mean energy at the end divided by that at the start
+  temperature_ratio    temperature ratio at the end; 1 in equilibrium
+  flow_share           share of flows in the kinetic energy; a large share means that the gas is not
+                       homogeneous
+
+--csv FILE writes all curves: reduced ones against collisions per disk, and in units of the input
+against time.
 
 refuses
   driven, falling or heated disks, disks at rest

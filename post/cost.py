@@ -2,9 +2,9 @@
 
     python post/cost.py runs/cost/*.h5 -o cost.png --csv cost.csv
 
-The fastest of several runs with the same method and number of disks N is used.  Fits are power laws
-in the range of --fit: below it, the cost of the collision itself matters, and above it the disks do
-not fit into the caches of the processor.
+Of several runs with the same method and number of disks N, the fastest is used.  Power laws are
+fitted in the range of --fit.  Below this range the cost of the collision itself matters; above it
+the disks do not fit into the caches of the processor.
 
 panels
   cost    processor time per collision against N, with fits (dotted outside their range)
@@ -13,7 +13,7 @@ first table (a row for each method and N)
   microseconds    processor time per collision
 
 second table (a row for each method)
-  exponent        of N, with its standard error
+  exponent        exponent of N in the fitted power law, with its standard error
 
 refuses
   unfinished runs

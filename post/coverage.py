@@ -2,20 +2,20 @@
 
     python post/coverage.py runs/coverage/*/*.h5 -o coverage.png --csv coverage.csv
 
-Runs at one packing fraction differ only in their seed.  The mean over all runs of the
-compressibility factor Z, from the virial, counts as its true value.  Correct
-errors contain it in 68 % of the runs.
+Runs at one packing fraction differ only in their seed.  The compressibility factor Z is calculated
+from the virial, and its mean over all runs counts as the true value.  Correct error bars contain
+the true value in 68 % of the runs.
 
 panels
   packing1, packing2, ...    Z of single runs with their errors
 
 table (a row for each packing fraction)
-  Z, scatter                   mean and standard deviation over the runs
+  Z, scatter                   mean and standard deviation of Z over the runs
   error, within_%              mean error, coverage
-  naive_error, naive_within_%  the same if all samples were independent
+  naive_error, naive_within_%  the same, calculated as if all samples were independent
 
 refuses
-  less than ten seeds, gravity, obstacles, inelastic disks
+  fewer than ten seeds, gravity, obstacles, inelastic disks
 
 see also
   equation_of_state.py, docs/explanation/statistics.md

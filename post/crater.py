@@ -12,15 +12,15 @@ panels
   energy           remaining kinetic energy and number of collisions against time
 
 table (a row for each run)
-  hit, displaced            disks that collided; that moved by more than their radius
+  hit, displaced            number of disks that collided, and that moved by more than their radius
   width, depth              extent of the displaced disks, depth below the surface
-  hole_width, hole_depth    extent of the region with less than half of the packing of the bed
-  energy_left               fraction of the initial energy
+  hole_width, hole_depth    extent of the region with less than half the packing fraction of the bed
+  energy_left               remaining fraction of the initial energy
   ended_by_time             1: the run ended before stop.energy_fraction was reached
   box_takes_part            1: wall collisions exceed 1 % of the number of disks
 
 refuses
-  no projectile, a bed that moves without one
+  runs without a projectile, beds that move without one
 
 see also
   crater_scan.py (sizes against parameters)

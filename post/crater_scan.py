@@ -2,10 +2,10 @@
 
     python post/crater_scan.py runs/crater_scan/*.h5 -o crater_scan.png --csv crater_scan.csv
 
-Runs that differ only in their seed are combined to a point, and points that differ in one parameter
-to a curve.  Fits are size = A x^p with equal weights of the points; for the restitution xi, x is
-1 - xi^2.  Numbers of disks have skewed distributions for light projectiles, so that errors of means
-over few runs are then too small.
+Runs that differ only in their seed form a point, and points that differ in one parameter form a
+curve.  The fits are size = A x^p with equal weights, where x is the parameter or, for the
+restitution xi, 1 - xi^2.  For light projectiles the numbers of disks have skewed distributions, so
+that errors of means over few runs are too small.
 
 panels (two for each parameter: mass, speed, radius, restitution)
   PARAMETER_numbers    disks hit and displaced
@@ -13,14 +13,17 @@ panels (two for each parameter: mass, speed, radius, restitution)
 
 first table (a row for each point)
   runs, hit, displaced, width, depth, hole_width, hole_depth    means, see crater.py
-  energy_left, side_collisions    fraction of the energy, collisions with walls
-  ended_by_time, in_fit           1: stop.time was reached; 1: the point is fitted
+  energy_left, side_collisions    remaining fraction of the energy, collisions with walls
+  ended_by_time                   1: stop.time was reached before stop.energy_fraction
+  in_fit                          1: the point is included in the fit
 
 second table (a row for each fit)
-  exponent, chi2/dof    error: jackknife over beds with common seeds, else from the points
+  exponent     exponent p, with its error from the jackknife over beds with common seeds, or else
+               from the points
+  chi2/dof     chi squared over the number of degrees of freedom
 
 refuses
-  no projectile, restitution that depends on velocity
+  runs without a projectile, restitution that depends on velocity
 
 see also
   crater.py (one crater)

@@ -15,15 +15,16 @@ panels
   picture1 ...        the last frame of each input, or the first and the last frame of one input
 
 table (a row for each input and species)
-  late                mean over the second half of the run; error: over runs or time
+  late                mean over the second half of the run, with its error over runs or time
   kT_x, kT_y          components of the temperature [energy]
-  deviation           standard deviation of the width; theory_deviation: predicted
+  deviation           standard deviation of the width; theory_deviation: predicted value
   enthalpy_change, momentum_change    largest relative changes of the conserved quantities
   theory, ratio       predicted value of `late`, and late / theory
 
-theory: balance of white noise and dissipation (van Noije and Ernst 1998); the adiabat of a slow
-side; the width at constant enthalpy; a dilute gas in two chambers (after Eggers 1999).  Equal
-disks are required, and equal elastic disks for the adiabat and the width.
+theories (for equal disks)
+  balance of white noise and dissipation (van Noije and Ernst 1998), dilute gas in two chambers
+  (after Eggers 1999); for elastic disks also the adiabat of a slow side, the width at constant
+  enthalpy
 
 refuses
   runs with one frame, --show width without a piston, --show viscosity without shear

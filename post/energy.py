@@ -3,8 +3,8 @@
     python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
 
 The conserved quantity is the total energy or, if energy is exchanged, total + dissipated - heat -
-work - drive.  Its changes are rounding errors for any time step, because flights and collisions are
-exact: large time steps miss collisions instead.
+work - drive.  It changes only by rounding errors, even for large time steps, because flights and
+collisions are exact.  Large time steps miss collisions instead.
 
 panels
   total1 ... total4       total energy and its parts, for the first run with each time step
@@ -13,13 +13,13 @@ panels
 
 table (a row for each run; changes relative to the total energy at the start)
   of                terms of the conserved quantity
-  total_energy      at the start [energy]
+  total_energy      total energy at the start [energy]
   drift             change of a fitted straight line over the run
-  spread            standard deviation from the line
-  largest_change    largest difference from the start
+  spread            standard deviation from this line
+  largest_change    largest difference from the value at the start
 
 refuses
-  disks at rest, less than two samples of the energies
+  disks at rest, fewer than two samples of the energies
 
 see also
   missed.py (collisions that time steps miss)

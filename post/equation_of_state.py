@@ -3,7 +3,7 @@
     python post/equation_of_state.py runs/state/eta_*.h5 -o state.png --csv state.csv
 
 Runs with equal packing fraction are combined.  Errors include the autocorrelation of the pressure.
-Z from the walls uses the area that centres can reach, and differs from Z far from the walls by a
+Z from the walls refers to the area accessible to the centres, and differs from the bulk value by a
 fraction of about 1/sqrt(N).  Disks of many radii r are compared with the equation of Santos, Yuste
 and Lopez de Haro (1999), which depends on <r>^2 / <r^2> and ends at the packing fraction 0.648.
 
@@ -12,7 +12,7 @@ panels
   deviation    relative deviation from the reference
 
 table (a row for each packing fraction)
-  Z_virial, Z_rate, Z_walls    compressibility factor by each method (-: does not apply)
+  Z_virial, Z_rate, Z_walls    compressibility factor from each method (-: does not apply)
   samples                      effective number of independent samples of the virial
   Z_reference                  published value
 

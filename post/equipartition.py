@@ -2,16 +2,17 @@
 
     python post/equipartition.py runs/fall/*.h5 -o equipartition.png --csv equipartition.csv
 
-Runs with the same initial speed v0 are combined.  T_therm is the time from which on the mean
-energies of the lightest and the heaviest species, in windows of time, differ by less than --within
-for three windows.  Few runs overestimate it: by 16 % for ten runs of 60 disks, and by less than 1 %
-for 100 runs.
+Runs with the same initial speed v0 are combined.  The mean energies of the lightest and the
+heaviest species are compared in windows of time.  T_therm is the time after which they differ by
+less than --within in three successive windows.  Few runs overestimate it: ten runs of 60 disks by
+16 %, 100 runs by less than 1 %.
 
 panels
   start1, start2, ...    energies of both species against time for each v0
 
 table (a row for each v0)
-  T_therm             with a bootstrap error over the runs; one run: from the fluctuations in time
+  T_therm             thermalisation time; error: bootstrap over the runs or, for a single run, from
+                      the fluctuations in time
   energy              total energy per disk in equilibrium
   K_light, K_heavy    kinetic energy per disk in equilibrium
 

@@ -4,11 +4,11 @@
 
 table (a row for each member run)
   member, overrides, seed    name of the run, and the variables that the sweep changes
-  state, reason              finished, unfinished or failed, and why
+  state, reason              finished, unfinished or failed, and the reason for a failure
   wall_time                  [s]
   observables                final values of all scalar observables
   flow_share                 for cooling gases: share of flows in the kinetic energy of the last
-                             frame, 0 on average in a homogeneous gas; with a warning if it is not
+                             frame; 0 on average in a homogeneous gas, otherwise with a warning
 
 see also
   docs/guides/ensembles.md

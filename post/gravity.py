@@ -1,11 +1,11 @@
-"""Distributions of squared speeds and heights of a gas under gravity, with exponential laws.
+"""Distributions of squared speed and of height under gravity, compared with exponential laws.
 
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
-Solid lines: P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT), exact for many
-point particles; h is the height of a centre above its lowest position.  Dashed lines allow for the
-fixed total energy of N disks and, to first order, for the area that disks exclude.  Slopes are
-maximum-likelihood fits for m v^2 / 2 up to 5 kT, and for m g h from 1 to 5 kT or the lid.
+The solid lines are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT), exact for
+many point particles; h is the height of a centre above its lowest position.  The dashed lines allow
+for the fixed total energy of N disks and, to first order, for the area that disks exclude.  Slopes
+are maximum-likelihood fits up to m v^2 / 2 = 5 kT, and for m g h between kT and 5 kT (or the lid).
 
 panels
   speeds, speeds_log      histograms of v^2 on linear and logarithmic axes
@@ -13,15 +13,15 @@ panels
 
 first table (a row for each species)
   kT, K, K_x                     temperature, kinetic energy and its part along x
-  speed_slope, height_slope      fitted slope over that of the solid line; error: jackknife
-  speed_shared, height_crowded   the same for the dashed line
+  speed_slope, height_slope      fitted slope divided by that of the solid line; error: jackknife
+  speed_shared, height_crowded   slope of the dashed line divided by that of the solid line
   height_fit_to                  upper end of the fit [kT / m g]
 
 second table
-  equilibrium_from, left_out_before    start of equilibrium, and what it is due to
+  equilibrium_from, left_out_before    start of equilibrium, and the criterion that determines it
 
 refuses
-  no gravity along y, moving or sliding walls, driven or inelastic disks
+  runs without gravity along y, moving or sliding walls, driven or inelastic disks
 
 see also
   equipartition.py (time to equilibrium), docs/tutorials/gravity.md (laws)

@@ -1,7 +1,7 @@
 """Laboratory: an interactive page that shows running simulations and changes their parameters.
 
-    python post/lab.py                 the inputs of the folder input/
-    python post/lab.py my.nml          and your own input file
+    python post/lab.py                 with the inputs of the folder input/
+    python post/lab.py my.nml          also with your own input file
 
 page
   inputs, sliders    the simulation responds at once

@@ -2,21 +2,23 @@
 
     python post/lyapunov.py runs/pairs/*.h5 -o lyapunov.png --csv lyapunov.csv
 
-Successive runs in the given order are pairs with almost the same start and frames at the same
-times.  The exponent lambda is the mean growth of the logarithm of the distance between two fixed
-distances over the mean time of this growth (Aurell and others, J. Phys. A 30, 1 (1997)).  A mean
-slope in a fixed interval of time would be too small, by 3 % in Sinai's billiard.
+The first two runs form a pair, the next two another, and so on.  Both runs of a pair start almost
+at the same point and have frames at the same times.  The exponent is the growth of the logarithm of
+their distance between two fixed distances, divided by the mean time of this growth (Aurell and
+others, J. Phys. A 30, 1 (1997)).  A mean slope in a fixed interval of time would be too small, by
+3 % in Sinai's billiard.
 
 panels
-  distances    Euclidean distance of each pair, geometric mean, fitted growth
+  distances    distance of each pair (Euclidean), geometric mean, fitted growth
 
 table (one row)
   pairs, from, to      number of pairs, mean times at which the growth begins and ends
-  lyapunov_exponent    [1/time], with its error from the jackknife over the pairs
-  --csv: distances of all pairs against time
+  lyapunov_exponent    exponent [1/time], with its error from the jackknife over the pairs
+
+--csv FILE writes the distances of all pairs against time.
 
 refuses
-  an odd number of runs, different disks or times in a pair, gases that cool
+  an odd number of runs, different disks or times in a pair, cooling gases
 
 see also
   trajectory.py, docs/guides/billiards.md

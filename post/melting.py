@@ -3,8 +3,9 @@
     python post/melting.py runs/melting/*/*.h5 -o melting.png --csv melting.csv
 
 In an infinite system the liquid and the hexatic phase coexist at P* = P d^2 / kT = 9.185 between
-the packing fractions 0.700 and 0.716.  In a finite box the interface causes a loop, which becomes
-flatter for larger N.  Correlation times are long near melting: heed the warnings about errors.
+the packing fractions 0.700 and 0.716.  In a finite box the interface between them causes a loop of
+the pressure curve, which becomes flatter as N increases.  Correlation times are long near melting:
+heed the warnings about errors.
 
 panels
   pressure    P* against the packing fraction; lines: Engel and others (2013), Li and others (2022)

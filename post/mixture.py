@@ -2,9 +2,9 @@
 
     python post/mixture.py runs/mixture/*.h5 -o mixture.png --csv mixture.csv
 
-All runs are combined.  The theory is <K> = kT and <v> = sqrt(pi kT / 2 m); in a periodic box <K> is
-smaller than kT by the fraction m / M, where M is the total mass of the disks.  If the kinetic
-energy is conserved, kT is known exactly; otherwise it is measured.
+All runs are combined.  The theory predicts <K> = kT and <v> = sqrt(pi kT / 2 m).  In a periodic box
+<K> is smaller than kT by the fraction m / M, where M is the total mass of the disks.  If the
+kinetic energy is conserved, kT is known exactly; otherwise it is measured.
 
 panels (two for each species)
   SPECIES_start          histogram of the speeds at the start
@@ -12,7 +12,7 @@ panels (two for each species)
 
 table (a row for each species)
   v_start, K_start          mean speed and kinetic energy at the start
-  v, K, kT_x, kT_y          means in equilibrium, with standard errors
+  v, K, kT_x, kT_y          mean speed, kinetic energy and components of kT in equilibrium
   v_theory, K_theory        predictions
   speeds, law, KS_D, KS_p   number of independent speeds, Kolmogorov-Smirnov test and its p-value
 

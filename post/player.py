@@ -6,12 +6,12 @@
     python post/player.py runs/gas.h5.part --live             while the run continues
 
 page
-  picture     disks, walls and obstacles to scale; a click on a disk shows its path and follows it
+  picture     disks, walls and obstacles to scale; click on a disk to see its path and follow it
   controls    play, next frame or event, speed, zoom, colours
-  plots       speeds, energies; for up to 20 disks a list of the next events
+  plots       speeds and energies; for up to 20 disks also a list of the next events
 
 film
-  paths       exact between frames if the run has an event log; otherwise frames only
+  paths       exact between frames if the run has an event log; otherwise only frames are shown
   size        without --count, as many evenly spread frames as fit into 30 MB
   --live      a web server on this computer shows an unfinished run until it ends
 

@@ -2,9 +2,10 @@
 
     python post/rough.py runs/rough.h5 -o rough.png --csv rough.csv
 
-The theory assumes Maxwell's velocities (Luding et al. 1998); direct simulations of the Boltzmann
-equation yield up to 6 % less.  A flow that develops in the cooling gas reduces T_rot / T further:
-by 3.8 to 4.6 % at a packing fraction of 0.02, and by 0.3 to 0.5 % at 0.0025.
+The theory assumes Maxwell's distribution of velocities (Luding et al. 1998).  Direct simulations of
+the Boltzmann equation yield a ratio T_rot / T that is up to 6 % smaller.  Flows that develop in the
+cooling gas reduce it further, by 3.8 to 4.6 % at a packing fraction of 0.02 and by 0.3 to 0.5 % at
+0.0025.
 
 panels
   temperatures    T = m <v^2> / 2 and T_rot = I <omega^2> against collisions per disk
@@ -12,7 +13,7 @@ panels
 
 table (one row)
   ratio                    T_rot / T in the steady state
-  maxwellian, boltzmann    predictions (-: not known)
+  maxwellian, boltzmann    predictions of both theories (-: not known)
 
 refuses
   smooth disks, walls, driving, mixtures, Coulomb friction, runs with different contact laws

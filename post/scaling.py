@@ -10,7 +10,8 @@ panels
 
 table (a row for each number of disks and of threads)
   seconds                      median of the wall times
-  gain, gain_least, gain_most  speedup over the median with one thread
+  gain, gain_least, gain_most  median, smallest and largest speedup, relative to the median time
+                               with one thread
 
 refuses
   unfinished runs, no run with one thread

@@ -2,11 +2,11 @@
 
     python post/scatterers.py 100000 0.01 --radius 0.9 --seed 1 -o scatterers.txt
 
-The file is for `obstacle.file` of an input with periodic sides.  The independent centres are
-distributed uniformly in a square, so that circles can overlap.  The script prints the side of the
-square, sqrt(number / density), for both components of `box.upper`.  The density is the number of
-circles per area; the reduced density of the theory is n R^2, where R is the sum of the radii of
-tracer and circle.
+An input with periodic sides can name the file in `obstacle.file`.  The arguments are the number of
+circles and their number per area, the density.  The centres are independent and distributed
+uniformly in a square, so that circles can overlap.  Set both components of `box.upper` to the side
+of the square, sqrt(number / density), which the script prints.  The reduced density of the theory
+is n R^2, where R is the sum of the radii of tracer and circle.
 
 see also
   lorentz.py, docs/guides/billiards.md

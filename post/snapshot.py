@@ -5,15 +5,15 @@
     python post/snapshot.py runs/gravity.h5 --count 12 --quiver        twelve frames, evenly spread
 
 colours (--colour)
-  species, speed    species has a legend, all others a scale common to all frames from 0 on
+  species, speed    species with a legend; speed, like all others, with one scale for all frames
   displacement      distance from the position in the first frame
   collisions        number of collisions since the start
   spin              angular velocity of disks that can rotate
-  psi6              phase of the bond order of a disk, relative to that of the mean over all disks
+  psi6              phase of the bond order of a disk, relative to that of the mean of all disks
 
 picture
   lines, outlines   orientations of rotating disks; species other than the first
-  periodic sides    a disk that overlaps one is drawn on both sides of the box
+  periodic sides    a disk overlapping a periodic side is drawn on both sides of the box
   titles            time, events or collisions, and the factor by which tiny disks are enlarged
 
 see also

@@ -2,23 +2,23 @@
 
     python post/speeds.py runs/gas/*.h5 -o speeds.png --csv speeds.csv
 
-Runs with the same number of disks N are combined.  Speeds are shown as u = v / sqrt(2 kT / m), with
-the equilibrium law P(u) = 2 u exp(-u^2) for any mass.  Equilibrium begins when no observable drifts
-any longer; while kT changes, each frame is scaled with its own kT.
+Runs with the same number of disks N are combined.  Speeds are reduced to u = v / sqrt(2 kT / m),
+for which Maxwell's law is P(u) = 2 u exp(-u^2) for any mass.  Equilibrium begins when no observable
+drifts any longer.  While kT changes, each frame is scaled with its own kT.
 
 panels
   start, end    histograms of one frame of the first run with the largest N
-  late          histograms of all frames that are used, with standard errors
+  late          histograms of all frames in equilibrium, with standard errors
   relaxation    second Sonine coefficient a2 against collisions per disk
 
 table (a row for each N and species)
-  runs, frames, speeds    numbers of what is used; `independent`: allowing for correlations in time
-  kT, kT_x, kT_y          temperatures [energy]; kT_first, kT_last: in single frames
-  mean_u, kurtosis, a2    <u>, <u^4> (2 for Maxwell's law), <v^4> / (2 <v^2>^2) - 1
+  runs ... independent    numbers of runs, frames, speeds and independent speeds
+  kT, kT_x, kT_y          temperature and its components [energy]; kT_first, kT_last: in one frame
+  mean_u, kurtosis, a2    <u>; <u^4>, 2 for Maxwell's law; <v^4> / (2 <v^2>^2) - 1
   law, KS_D ... chi2_p    law of the tests, Kolmogorov-Smirnov and chi-square tests with p-values
 
 refuses
-  less than three disks, disks at rest, sliding surfaces, runs that differ in kind
+  fewer than three disks, disks at rest, sliding surfaces, runs that differ in kind
 
 see also
   mixture.py (unscaled speeds of each species), docs/explanation/statistics.md (tests)

@@ -3,8 +3,8 @@
     python post/trajectory.py runs/sinai.h5 -o sinai.png               all disks (at most 12)
     python post/trajectory.py runs/sinai.h5 --disks 1,5 --frames :200  two of them, 200 frames
 
-Straight lines connect the positions in successive frames.  Without gravity they are exact if the
-run has a frame at every event (output.frames_every_events = 1).  Several runs are drawn side by
+Straight lines connect the positions in successive frames.  Without gravity these paths are exact if
+the run has a frame at every event (output.frames_every_events = 1).  Several runs are drawn side by
 side.
 """
 

@@ -2,21 +2,22 @@
 
     python post/transport.py runs/driven/transport_*/*.h5 -o transport.png --csv transport.csv
 
-Runs with equal packing fraction are combined.  They need the Helfand moments (output.helfand) and
-about four samples of the observables per mean free time; D needs frames at equal times.  A
-viscosity or the conductivity is half of the slope of the mean square change of a Helfand moment
-against the lag; D is half of the integral of <v(0) v(s)>.  A fixed total energy reduces the
-coefficients by 2 to 6 over N (docs/explanation/laws.md).
+Runs with equal packing fraction are combined.  They need the Helfand moments (output.helfand) with
+about four samples per mean free time and, for D, frames at equal intervals.  A viscosity or the
+conductivity is half the slope of the mean square change of a Helfand moment against the lag.  D is
+half of the integral of <v(0) v(s)>.  The fixed total energy of N disks reduces the coefficients by
+a fraction of 2/N to 6/N (docs/explanation/laws.md).
 
 panels
-  viscosity, conductivity, bulk_viscosity, D    coefficient over Enskog's against the lag
+  viscosity, conductivity, bulk_viscosity, D    coefficient divided by Enskog's, against the lag
   all                                           means over the lags, against the packing fraction
 
 table (a row for each packing fraction and coefficient)
-  value, enskog, unit    mean over the lags from t/2 to t, Enskog's value (Gass 1971; mixtures:
-                         Lopez de Haro, Cohen and Kincaid 1983), unit of both; t is 20 mean free
-                         times, and for D the time in which sound crosses the box
-  ratio                  value / enskog
+  value      mean over the lags from t/2 to t; t is 20 mean free times or, for D, the time in which
+             sound crosses the box
+  enskog     Enskog's value (Gass 1971; mixtures: Lopez de Haro, Cohen and Kincaid 1983)
+  unit       unit of both
+  ratio      value / enskog
 
 refuses
   walls, inelastic disks, driving, runs without Helfand moments or shorter than eight collisions

@@ -1,4 +1,4 @@
-"""Density, flow, temperature, stress and heat flux as functions of position in a steady state."""
+"""Density, flow velocity, temperature, stress and heat flux as functions of position."""
 
 import argparse
 from types import SimpleNamespace

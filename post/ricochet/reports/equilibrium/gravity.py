@@ -1,4 +1,4 @@
-"""Distributions of squared speeds and heights of a gas under gravity, with exponential laws."""
+"""Distributions of squared speed and of height under gravity, compared with exponential laws."""
 
 from types import SimpleNamespace
 from typing import Any, NamedTuple
