@@ -174,7 +174,7 @@ def publish(
     """Print tables and warnings, save the figure, and write the file of --csv."""
     if any(tables):
         print("\n\n".join(text_of(table) for table in tables if table), flush=True)
-    for note in [*notes, *without_error(tables)]:
+    for note in [*notes, *without_error(tables, notes)]:
         print(f"warning: {note}", file=sys.stderr)
     if figure is not None:
         save(figure, args.output, args.runs, args.title)
