@@ -16,6 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = "docs/reference/input"
 LAW = "Collision rules of boundaries"
+BOUNDARIES = ("side", "obstacle", "wall")
 GROUPS = {
     "run": "The group `&run` sets the seed, the method and the number of threads.",
     "box": "The group `&box` sets the size of the box, its boundaries, gravity and shear "
@@ -115,7 +116,7 @@ def variables(program: Path) -> dict[str, dict[str, dict]]:
     table of variables are stored as texts in the format of the program.
     """
     table = json.loads(said(program, "--print-variables"), parse_float=str, parse_int=str)
-    walls = [table[group] for group in ("side", "obstacle", "wall")]
+    walls = [table[group] for group in BOUNDARIES]
     law = {name: entry for name, entry in walls[1].items() if shared(walls, name)}
     for wall in walls:
         for name in law:
@@ -207,19 +208,23 @@ def example_of(group: str) -> list[str]:
     return [*lines, ""]
 
 
-def linked(name: str, group: str) -> str:
-    """Return a link to the section of the page that describes a variable."""
+def row_of(name: str, group: str, entry: dict, page: str = "") -> str:
+    """Return a row of the list of variables, which links to the section on the variable."""
     title = name if group == LAW else f"{group}.{name}"
-    return f"[`{name}`](#{re.sub(r'[^a-z0-9_ -]', '', title)})"
+    default = f"`{written(entry)}`" if entry["default"] is not None else ""
+    return f"| [`{name}`]({page}#{re.sub(r'[^a-z0-9_ -]', '', title)}) | {default} |"
 
 
-def group_page(group: str, entries: dict[str, dict]) -> str:
-    """Return the text of the page about a group of input variables."""
+def group_page(group: str, entries: dict[str, dict], common: dict[str, dict]) -> str:
+    """Return the text of the page about a group of input variables.
+
+    The list of variables includes those of the collision rule, `common`, if the group has them.
+    """
     lines = [f"# {title_of(group)}", "", GROUPS[group], "", *example_of(group)]
     lines += ["## Variables", "", "| variable | default |", "|---|---|"]
-    for name, entry in entries.items():
-        default = f"`{written(entry)}`" if entry["default"] is not None else ""
-        lines.append(f"| {linked(name, group)} | {default} |")
+    lines += [row_of(name, group, entry) for name, entry in entries.items()]
+    if group in BOUNDARIES:
+        lines += [row_of(name, LAW, entry, f"{file_of(LAW)}.md") for name, entry in common.items()]
     lines += ["", *(section(group, *one) for one in entries.items())]
     return "\n".join(lines)
 
@@ -228,7 +233,7 @@ def pages(program: Path) -> dict[str, str]:
     """Return a dictionary from the path of each page to its text."""
     groups = variables(program)
     found = {
-        f"{FOLDER}/{file_of(group)}.md": group_page(group, entries)
+        f"{FOLDER}/{file_of(group)}.md": group_page(group, entries, groups[LAW])
         for group, entries in groups.items()
     }
     items = "".join(

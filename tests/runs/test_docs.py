@@ -55,6 +55,14 @@ def test_the_input_pages_are_current(program):
     } <= {*pages}
 
 
+def test_the_page_of_a_group_lists_all_its_variables(program):
+    """The variables of the collision rule are described on a page of their own."""
+    pages = script_in_docs("input_page").pages(program)
+    for group, entries in json.loads(ran(program, "--print-variables").stdout).items():
+        listed = re.findall(r"^\| \[`(\w+)`\]", pages[f"docs/reference/input/{group}.md"], re.M)
+        assert sorted(listed) == sorted(entries)
+
+
 def test_the_other_reference_pages_are_current(program):
     pages = script_in_docs("reference_pages").pages(program)
     old = [path for path, text in pages.items() if (ROOT / path).read_text() != text]
