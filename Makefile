@@ -208,9 +208,10 @@ endif
 venv := .venv/bin/python
 jobs = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 
-# One `make` at a time works in a folder; a second one waits, and then finds everything done.
+# One `make` at a time works in a folder; a second one waits, and then finds everything done. It does not print that files are up to
+# date.
 build = mkdir -p $(BUILD) 2>/dev/null && [ -w $(BUILD) ] || { echo 'Cannot write to $(BUILD); BUILD=folder takes another' >&2; exit 2; }; \
-  $(if $(shell command -v flock),flock $(BUILD)/lock) $(MAKE)
+  $(if $(shell command -v flock),flock $(BUILD)/lock) $(MAKE) $(if $(V),,--silent)
 
 libraries = $(addprefix $(BUILD)/,libricochet.so libricochet_files.so ricochet.h)
 # Both in one `make`, if both are asked for: a second one that waited for the lock would take a core from the first.

@@ -66,11 +66,17 @@ async def open_lab(lab: Lab, ports: list[int], visit: bool) -> None:
             if ports[0] == USUAL_PORT and f":{USUAL_PORT}/" not in address:
                 print(in_use(address), flush=True)
             if visit:
-                threading.Thread(target=webbrowser.open, args=[address], daemon=True).start()
+                threading.Thread(target=open_page, args=[address], daemon=True).start()
             await stop.wait()
             await lab.close()
     finally:
         await lab.close()
+
+
+def open_page(address: str) -> None:
+    """Open the page in a browser, or print that the user must do it, as on a remote computer."""
+    if not webbrowser.open(address):
+        print(f"No browser can be opened here: open {address} in a browser", flush=True)
 
 
 def in_use(address: str) -> str:

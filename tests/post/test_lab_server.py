@@ -66,6 +66,15 @@ def test_runs_have_their_number(program, monkeypatch):
     asyncio.run(visit())
 
 
+def test_a_computer_without_a_browser_gets_the_address_to_open(program, tmp_path, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("BROWSER", "/bin/false")
+    with laboratory(program, tmp_path, "--open") as (process, address):
+        said = process.stdout.readline()
+        assert "No browser" in said and address in said
+
+
 def test_other_sites_are_refused_before_they_cost_anything(address):
     async def ask(session, path, **headers):
         return (await session.get(address + path, headers=headers)).status
