@@ -4,10 +4,10 @@
 
 The script prints one line per problem.  It checks that dependences between folders agree with the
 arrows in src/README.md and post/ricochet/README.md.  It checks the lengths of files, procedures,
-argument lists and comment lines, the comments before procedures, the visibility of names, and the
-choice of names.  It also checks the help texts, the first words of sentences, and the use of a few
-forbidden words.  Finally it checks that there are no preprocessor directives and no paths that
-exist only on one computer.
+argument lists and comment lines, the case of keywords, the comments before procedures, the
+visibility of names, and the choice of names.  It also checks the help texts, the first words of
+sentences, and the use of a few forbidden words.  Finally it checks that there are no preprocessor
+directives and no paths that exist only on one computer.
 """
 
 import ast
@@ -36,6 +36,14 @@ PROCEDURE = re.compile(rf"\s*{PREFIX}(?:subroutine|function)\s+(\w+)\s*\(")
 END = re.compile(r"\s*end\s+(?:subroutine|function)\b")
 TYPES = "type|class|real|integer|logical|character|procedure"
 DECLARATION = re.compile(rf"(?:use|import|implicit)\b|(?:{TYPES})\b.*::")
+WORDS = (
+    "allocatable allocate associate call case character class contains cycle deallocate do else "
+    "elseif elemental end enddo endif exit function if implicit impure in inout integer intent "
+    "interface intrinsic kind logical module none only optional out parameter pointer private "
+    "procedure program public pure real recursive result return select submodule subroutine then "
+    "type use where while"
+)
+KEYWORD = re.compile(rf"\b(?:{'|'.join(WORDS.split())})\b", re.IGNORECASE)
 EMPTY_WORDS = re.compile(r"(?:get|set(?!_in_)|do|handle)_|(?:\w+_)?(?:manager|utils?)(?:_|$)")
 MACHINE_PATH = re.compile(r"""(?:^|[\s"'=(:])/(?:home|root|Users|work|tmp|mnt|scratch)/\w""")
 # The help text of a variable begins with a capitalised noun that names the quantity, and not with a
@@ -75,7 +83,20 @@ class Problem(NamedTuple):
 
 def code_of(line: str) -> str:
     """Return a line of code in lower case, without strings and without its comment."""
-    return re.sub(r"'[^']*'|\"[^\"]*\"", "''", line).split("!")[0].lower()
+    return bare(line).lower()
+
+
+def bare(line: str) -> str:
+    """Return a line of code without strings and without its comment."""
+    return re.sub(r"'[^']*'|\"[^\"]*\"", "''", line).split("!")[0]
+
+
+def keyword_problems(path: Path, text: str) -> Iterator[Problem]:
+    """Return keywords with capital letters."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        for found in KEYWORD.finditer(bare(line)):
+            if not found[0].islower():
+                yield Problem(path, number, f"{found[0]}: write keywords in lower case")
 
 
 def arrows_of(page: str) -> dict[str, set[str]]:
@@ -375,6 +396,7 @@ def problems_of(root: Path) -> Iterator[Problem]:
         own = path.relative_to(root)
         yield from arrow_problems(own, lines, homes, arrows)
         yield from unit_problems(own, lines)
+        yield from keyword_problems(own, text)
         yield from procedure_problems(own, lines)
         yield from heading_problems(own, text)
         yield from column_problems(own, text)

@@ -285,6 +285,7 @@ def test_a_submodule_is_a_file_of_its_name_that_needs_no_private(tmp_path):
         ("It says:", f"It says: '/{'home'}/me'", 1, "path of one machine"),
         ("!> Twice.", "!> Twice. What is doubled", 8, "a sentence begins with What"),
         ("!> Twice.", "!> Those of all.", 8, "a sentence begins with Those of"),
+        ("contains\n", "CONTAINS\n", 7, "CONTAINS: write keywords in lower case"),
         ("!> Twice.", "!> Drawn by turns.", 8, "'by turns': write alternately"),
     ],
 )
