@@ -371,9 +371,10 @@ const rounded = (value, power) => Math.abs(power) > 7 ? short(value)
   : (Math.round(value / 10 ** power) * 10 ** power).toFixed(Math.max(0, -power)).replace('-', '−');
 const secondDigit = error => Math.floor(Math.log10(error.toPrecision(2))) - 1;
 
-// Returns a mean and its error, rounded to two digits of the error. A line can break before the sign ±, but not after it.
-function withError({ value, error }) {
-  if (value === null || !error) return value === null ? '' : short(value);
+// Returns a mean and its error, rounded to two digits of the error, or a question mark if the run is too short for an error. A line can break before the sign ±, but not after it.
+function withError({ value, error, short: isShort }) {
+  if (value === null) return isShort ? 'too short' : '';
+  if (!error) return isShort ? `${short(value)} ±\u00a0?` : short(value);
   return [value, error].map(one => rounded(one, secondDigit(error))).join(' ±\u00a0');
 }
 
@@ -418,12 +419,14 @@ function tellNumbers() {
   const runs = overlaid.map(({ letter, numbers }) => [letter, numbers()]), texts = { now: one => seen(one.now), mean: withError, theory: lawOf };
   runs.push([parent.letterOf?.(window), own]);
   const columns = runs.length === 1
-    ? Object.entries(texts).filter(([name]) => some(own, name === 'mean' ? 'value' : name)).map(([name, text]) => [name, own, text])
+    ? Object.entries(texts).filter(([name]) => name === 'mean' ? some(own, 'value') || own.some(one => one.short) : some(own, name)).map(([name, text]) => [name, own, text])
     : runs.flatMap(([letter, rows]) => [[letter, rows, one => one.value === null ? seen(one.now) : withError(one)],
       ...(some(rows, 'theory') ? [['theory', rows, texts.theory]] : [])]);
   const kind = k => columns[k - 1]?.[0] === 'theory' ? ' class="law"' : '';
   const cells = (row, tag) => `<tr>${row.map((one, k) => `<${tag}${kind(k)}>${one}</${tag}>`).join('')}</tr>`;
-  $('numbers').innerHTML = cells(['', ...columns.map(([name]) => name)], 'th') + own.map(({ name }) => [safe(name),
+  const isShort = columns.some(([, rows]) => rows.some(one => one.short && one.value !== null));
+  const note = isShort ? '<caption>± ?: the run is too short for an error</caption>' : '';
+  $('numbers').innerHTML = note + cells(['', ...columns.map(([name]) => name)], 'th') + own.map(({ name }) => [safe(name),
     ...columns.map(([, rows, text]) => text(rows.find(one => one.name === name) ?? { now: null, value: null, theory: null }))])
     .filter(row => row.slice(1).some(Boolean)).map(row => cells(row, 'td')).join('');
 }

@@ -15,6 +15,7 @@ from ricochet.pages.numbers import (
     sampled,
     snapshot_run,
 )
+from sampling import samples
 from synthetic_run import ROOT
 
 
@@ -86,8 +87,48 @@ def test_theory_is_what_is_measured_in_equilibrium(case):
     assert all((one["value"] is None) == (case == "grains") for one in found[:-1])
     for one in found[:-1]:
         if one["theory"] is not None:
-            allowed = 5 * one["error"] + 0.005 * one["value"]
+            error = one["error"]
+            assert one["short"] == (error is None)
+            allowed = 0.03 * one["value"] if error is None else 5 * error + 0.005 * one["value"]
             assert one["theory"] == pytest.approx(one["value"], abs=allowed), one
+
+
+SHORT = {  # systems in which momentum, the energies of species, or all energy fluctuate slowly
+    "a gas between walls": "&species count = 100 radius = 0.015 speed = 1 /",
+    "a mixture between walls": "&species name = 'a' count = 60 radius = 0.01 speed = 1 /\n"
+    "&species name = 'b' count = 40 radius = 0.02 mass = 4 speed = 1 /",
+    "thermal walls": "&box boundary = 'wall', 'periodic' /\n&side name = 'left' temperature = 1 /\n"
+    "&species count = 60 radius = 0.02 speed = 1 /",
+}
+
+
+@pytest.mark.parametrize("case", SHORT)
+@samples(8, 60)
+def test_errors_include_slow_fluctuations_or_the_run_is_too_short_for_them(case, samples):
+    """Deviations from theory have about unit variance in units of the error, at all lengths.
+
+    A sample is taken after 0.2 or 2 collisions per disk.
+    """
+    deviations, known = [], []
+    for seed in range(samples):
+        rows = []
+        with Simulation(SHORT[case], {"run.seed": seed}) as simulation:
+            run, every = snapshot_run(simulation), simulation.n_disks // (10, 1)[seed % 2]
+            for _ in range(801):
+                value = observed(simulation)
+                rows.append(sample_of(run, value))
+                simulation.advance_by(collisions=every)
+                if len(rows) not in (41, 81, 161, 401, 801):
+                    continue
+                found = means(run, rows, value["all/kinetic_energy"] * simulation.n_disks)[:-2]
+                exact = [one for one in found if one["error"] is not None]
+                assert all(one["short"] == (one["error"] is None) for one in found)
+                assert not exact or rows[-1][4] >= 30, "the speeds have hardly relaxed"
+                deviations += [(one["value"] - one["theory"]) / one["error"] for one in exact]
+            known.append(len(exact) / len(found))
+    assert np.sqrt(np.mean(np.square(deviations))) < 1.8
+    assert np.max(np.abs(deviations)) < 6
+    assert any(known), "a long run is long enough"
 
 
 SCANS = {  # for a gas: changes, measured quantity, values, and expected proportionality

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from ..analysis.equilibrium import conserved_momentum
+from ..analysis.equilibrium import SPEEDS_FORGET, conserved_momentum
 from ..analysis.statistics import SeriesMean, correlated_mean, equilibration
 from ..predictions.walls import virial_pressure
 from ..reading.nature import Nature, bath_temperatures
@@ -20,7 +20,10 @@ FEW_DISKS = 20  # largest number of disks whose next events are sent
 PISTON_MARGIN = 0.2  # region beyond a piston that is shown [largest edge of the box]
 FEWEST = 40  # smallest number of samples of a mean with an error
 TURNS = "angular_velocity"
-KEPT = 4  # quantities at the start of a sample from which pressures follow
+KEPT = 5  # quantities at the start of a sample that are not averaged
+FEWEST_FREEDOM = 4  # smallest number of degrees of freedom of an error
+DECAYS = 5  # smallest duration of a mean in decay times of slow fluctuations
+POINTS = 200  # largest number of samples from which a decay time is determined
 
 
 @dataclass(frozen=True)
@@ -112,42 +115,93 @@ def pressure_between(samples: np.ndarray) -> SeriesMean:
 
 
 def sample_of(run: Run, value: dict) -> tuple[float, ...]:
-    """Return a sample: the quantities of `sampled`, the temperature, and the mean speeds."""
+    """Return the quantities of `sampled`, collisions per disk, temperature and mean speeds."""
     speeds = [value[f"{name}/mean_speed"] for name in run.names]
-    return (*sampled(run.n_disks, value), value["all/temperature"], *speeds)
+    tau = 2 * value["collisions"] / run.n_disks
+    return (*sampled(run.n_disks, value), tau, value["all/temperature"], *speeds)
 
 
 def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list[dict]:
     """Return mean, error and theory of the temperature, the mean speeds and the pressure.
 
-    The means over samples in equilibrium have errors with autocorrelation. They are omitted if the
-    run does not relax, or has too few samples so far, as theories are where none is known. `energy`
-    is the present energy of all disks.
+    The means over samples in equilibrium have errors that include the autocorrelation. They are
+    omitted if the run does not relax, as theories are where none is known. While the run is too
+    short for a reliable error, `short` is True. `energy` is the present energy of all disks.
     """
     titles = ["temperature"]
     titles += [f"mean speed of {name}" for name in run.names] if run.names[1:] else ["mean speed"]
     found: list[SeriesMean | None] = [None] * (len(titles) + 1)
-    columns = np.array(samples).T
-    if run.nature.in_equilibrium and len(samples) >= FEWEST:
-        first = max(map(equilibration, columns[KEPT:]))
-        if len(samples) - first > FEWEST // 2:
-            late = columns[:, first:]
-            found = [*map(correlated_mean, late[KEPT:]), pressure_between(late)]
+    settles = run.nature.in_equilibrium
+    if settles and len(samples) >= FEWEST:
+        found = relaxed_means(run, np.array(samples).T, equilibrium_temperature(run, energy))
     expected = theory(run, energy, found[0].mean if found[0] else None)
-    return [
+    rows = zip([*titles, "pressure"], found, expected, strict=False)
+    table = [
         {
             "name": title,
             "value": mean.mean if mean else None,
-            "error": mean.error if mean else None,
+            "error": mean.error if mean and mean.error >= 0 else None,
+            "short": settles and not (mean and mean.error >= 0),
             "theory": law,
         }
-        for title, mean, law in zip(
-            [*titles, "pressure", "pressure of an ideal gas"],
-            [*found, None],
-            expected,
-            strict=True,
-        )
+        for title, mean, law in rows
     ]
+    ideal = {"name": "pressure of an ideal gas", "value": None, "error": None, "short": False}
+    return [*table, ideal | {"theory": expected[-1]}]
+
+
+def relaxed_means(run: Run, columns: np.ndarray, kt: float | None) -> list[SeriesMean | None]:
+    """Return the means of temperature, mean speeds and pressure after the relaxation.
+
+    Samples in the first `SPEEDS_FORGET` collisions per disk are left out; there are no means before
+    as many collisions again. An error is NaN if it has too few degrees of freedom, or if slow
+    fluctuations on which the quantity depends have not decayed several times: those of the total
+    momentum change the temperature, and those of the total energy beside a heat bath all
+    quantities. During a fraction of their decay time samples look independent, although all of them
+    deviate alike from the mean.
+    """
+    tau = columns[KEPT - 1]
+    first = max(map(equilibration, columns[KEPT:]))
+    first = max(first, int(np.searchsorted(tau, tau[0] + SPEEDS_FORGET)))
+    late = columns[:, first:]
+    if late.shape[1] < FEWEST // 2 or tau[-1] - tau[first] < SPEEDS_FORGET:
+        return [None] * (len(columns) - KEPT + 1)
+    found = [*map(correlated_mean, late[KEPT:]), pressure_between(late)]
+    count, energy, temperature = run.n_disks, late[1], late[KEPT]
+    kt = kt or found[0].mean
+    drift, axes = conserved_drift(run)
+    share = 1 - axes / 2  # energy of the momentum that is not conserved, in units of kT
+    fixed = not bath_temperatures(run.parameters)
+    fixed = fixed or decays(energy, drift + (count - axes / 2) * kt, count * kt**2)
+    calm = [decays(energy - count * temperature, drift + share * kt, share * kt**2)]
+    calm += [True] * (len(found) - 1)
+    return [
+        one if one.error == 0 or (fixed and own and one.freedom >= FEWEST_FREEDOM) else short(one)
+        for one, own in zip(found, calm, strict=True)
+    ]
+
+
+def short(mean: SeriesMean) -> SeriesMean:
+    """Return a mean without its error."""
+    return mean._replace(error=np.nan)
+
+
+def decays(series: np.ndarray, mean: float, variance: float) -> bool:
+    """Return whether fluctuations decay at least `DECAYS` times during a series (T,).
+
+    They have decayed at the lag up to which their autocorrelation is below 1/3 on average. This
+    average also decreases slowly if a slow decay modulates oscillations. `mean` and `variance` are
+    those of a very long series.
+    """
+    rest = series[:: max(1, len(series) // POINTS)] - mean
+    scale, total = max(variance, float(np.mean(rest**2))), 1.0
+    if scale <= (1e-9 * mean) ** 2:
+        return True  # constant up to rounding
+    for lag in range(1, len(rest) // DECAYS + 1):
+        total += 1 - float(np.mean((rest[lag:] - rest[:-lag]) ** 2)) / (2 * scale)
+        if total <= (lag + 1) / 3:
+            return True
+    return False
 
 
 def theory(run: Run, energy: float, measured: float | None) -> list[float | None]:
@@ -167,9 +221,12 @@ def theory(run: Run, energy: float, measured: float | None) -> list[float | None
         return law
     kt = expected or measured / (1 - 1 / count)
     drift, axes = conserved_drift(run)
+    mass, has_bath = float(np.sum(run.mass)), bool(bath_temperatures(run.parameters))
+    fixed = fixed_energy_factor(freedoms(run)) ** 2 if expected and not has_bath else 1.0
     for k, kind in enumerate(run.by_species):
         if kind.alike:
-            law[1 + k] = mean_speed(kt / kind.mass, 2 * drift / np.sum(run.mass))
+            still = 1 - axes / 2 * kind.mass / mass  # the total momentum is no thermal motion
+            law[1 + k] = mean_speed(still * fixed * kt / kind.mass, 2 * drift / mass)
     if not all(alike) or count <= FEW_DISKS:
         return law
     if run.nature & {"obstacles", "time_stepped", "gravity", "piston"}:
@@ -188,9 +245,23 @@ def equilibrium_temperature(run: Run, energy: float) -> float | None:
         return baths[0]
     if not nature.keeps_energy or "gravity" in nature:
         return None
-    drift, axes = conserved_drift(run)
-    freedoms = 2 * run.n_disks - axes + ("rough" in nature) * run.n_disks
-    return 2 * (energy - drift) / freedoms
+    return 2 * (energy - conserved_drift(run)[0]) / freedoms(run)
+
+
+def freedoms(run: Run) -> int:
+    """Return the number of degrees of freedom of the thermal motion of all disks."""
+    return (3 if "rough" in run.nature else 2) * run.n_disks - conserved_drift(run)[1]
+
+
+def fixed_energy_factor(count: int) -> float:
+    """Return the mean speed at fixed energy over that at fixed temperature.
+
+    The velocities are distributed uniformly on a sphere in `count` dimensions.
+    """
+    half = count / 2
+    return float(
+        np.sqrt(half) * np.exp(scipy.special.gammaln(half) - scipy.special.gammaln(half + 0.5))
+    )
 
 
 def conserved_drift(run: Run) -> tuple[float, int]:
