@@ -84,8 +84,8 @@ A number in parentheses is the standard error of the last digit.
   | Boltzmann equation | 1.455 |
 
 - **P7-07, collision rates of a mixture.** The reference is calculated with approximate contact
-  values of the pair distribution functions. The table compares their error, to first order in the
-  density at packing 0.1, with the measured deviation.
+  values of the pair distribution functions. For packing 0.1 the table lists the error of these
+  values, to first order in the density, and the measured deviation from the reference.
 
   | pair | error of the contact value (%) | measured deviation (%) |
   |---|---|---|
@@ -284,11 +284,12 @@ are:
   with Student's t make this ratio larger than 1.
 - *three*: coverage of means over three bars, whose errors follow from their scatter.
 
-Four rows of the craters are outside the limits. How many disks are hit or displaced by a projectile
-as light as a disk has a skewed distribution (skewness 2.2). Four values of such a distribution
-often include no large value; then both their mean and their error are too small. In random choices
-from 240 craters, the coverage is 64 % for 16 values and 67 % for 64 values. The exponents follow
-from these numbers, and their errors are too small for the same reason.
+Four rows of the craters are outside the limits. A projectile as light as a disk hits or displaces
+few disks in most beds and many in some: the distribution of these numbers is skewed (skewness 2.2).
+Four values of such a distribution often include no large value; then both their mean and their
+error are too small. In random choices from 240 craters, the coverage is 64 % for 16 values and 67 %
+for 64 values. The exponents follow from these numbers, and their errors are too small for the same
+reason.
 
 | system | quantity | bars | coverage | error / scatter | three |
 |---|---|---|---|---|---|
