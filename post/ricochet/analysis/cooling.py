@@ -1,7 +1,7 @@
-"""Cooling gases: energies averaged over runs, Haff's law, temperatures of rough disks.
+"""Cooling gases: mean energies of an ensemble, Haff's law and the temperatures of rough disks.
 
-tau is the number of collisions per disk. `Curves` contain coordinates of points, as arrays, and the
-quantities measured there, as estimates with errors.
+Throughout, tau is the number of collisions per disk. `Curves` maps names to arrays of coordinates,
+or to estimates (with errors) of the quantity measured at these coordinates.
 """
 
 from collections.abc import Sequence
@@ -27,30 +27,31 @@ __all__ = [
 
 Curves = dict[str, np.ndarray | Estimate]
 
-WINDOW = 2.0  # collisions per disk over which a cooling rate is averaged
-SLOW = 0.9  # below this ratio to Haff's rate a gas is not homogeneous
+WINDOW = 2.0  # averaging window of a cooling rate [collisions per disk]
+SLOW = 0.9  # cooling rate over Haff's rate below which a gas counts as inhomogeneous
 SMOOTH = (
     "inelastic",
     "soft_contacts",
     "mixture",
     "rotating",
-)  # traits of gases that cool by Haff's law
+)  # traits of gases that obey Haff's law
 NOT_COOLING = "it is not a freely cooling gas"
-COOLING = TRAITS.keys() - SOURCES - {"collapsed", "gravity"}  # traits of freely cooling gases
-TOGETHER = 25  # number of disks in a cell in which a common velocity is measured
-FLOWING = 0.05  # share of flows in the kinetic energy above which a gas is not homogeneous
-SETTLED = 0.005  # relative distance from its limit at which the ratio counts as steady
+# all traits that a freely cooling gas may have
+COOLING = TRAITS.keys() - SOURCES - {"collapsed", "gravity"}
+TOGETHER = 25  # disks per cell when the velocities of neighbours are compared
+FLOWING = 0.05  # fraction of the kinetic energy in flows above which a gas counts as inhomogeneous
+SETTLED = 0.005  # relative distance from its limit at which the temperature ratio counts as steady
 
 
 def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate the K curves of each run on a common grid up to the end of the shortest run."""
+    """Interpolate the K curves of each run on a common grid that ends with the shortest run."""
     grid = np.linspace(0, min(own[-1] for own in x), points)
     each = zip(x, y, strict=True)
     return grid, np.array([[np.interp(grid, own, k) for k in tracks] for own, tracks in each])
 
 
 def energies(runs: list[Run], points: int = 201) -> Curves:
-    """Average the kinetic energies over runs that differ by their seed.
+    """Average the kinetic energies of cooling gases over runs that differ only in their seed.
 
     Parameters
     ----------
@@ -62,14 +63,14 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     Returns
     -------
     dict of str to numpy.ndarray or Estimate
-        (points,) curves: "K_all" and "K_SPECIES", over the initial energy of all disks, at
-        "collisions_per_disk"; "energy_all" and "energy_SPECIES" at "time"; and "ratio", the
-        temperature of the heaviest over that of the lightest species
+        curves of shape (points,): "K_all" and "K_SPECIES" (relative to the initial energy of all
+        disks) against "collisions_per_disk"; "energy_all" and "energy_SPECIES" against "time"; and
+        "ratio", the temperature of the heaviest species divided by that of the lightest
 
     Raises
     ------
     Refused
-        if a run is driven, or disks are at rest at its start
+        if a run is driven, or if the disks are initially at rest
 
     Examples
     --------
@@ -103,22 +104,22 @@ def temperature_ratio(runs: Sequence[Run], first: float, last: float) -> Estimat
     Parameters
     ----------
     runs : sequence of Run
-        (R,) runs of one cooling mixture, which differ by their seed
+        (R,) runs of one cooling mixture that differ only in their seed
     first, last : float
-        ends of the part in collisions per disk; a run that ends earlier is used up to its end
+        collisions per disk between which the ratio is averaged, or up to the end of a shorter run
 
     Returns
     -------
     Estimate
-        temperature of the heaviest over that of the lightest species, averaged over collisions per
+        temperature of the heaviest species over that of the lightest, averaged over collisions per
         disk and over the runs
 
     Raises
     ------
     Refused
-        if all species have the same mass, or a run is driven
+        if all species have the same mass, or if a run is driven
     RunError
-        if a run has fewer than `first` collisions per disk
+        if a run ends before `first` collisions per disk
 
     Examples
     --------
@@ -140,7 +141,7 @@ def temperature_ratio(runs: Sequence[Run], first: float, last: float) -> Estimat
 
 
 def moving_energy(run: Run, name: str = "all") -> np.ndarray:
-    """Return the samples (T,) of the kinetic energy per disk; the first sample must not be 0."""
+    """Return the kinetic energy per disk at each sample (T,); at first it must not be zero."""
     energy = run.observable(f"{name}/kinetic_energy").value
     if name == "all" and not energy[0] > 0:
         raise Refused(f"{run.path}: starts with disks at rest, which cannot cool")
@@ -151,36 +152,37 @@ def moving_energy(run: Run, name: str = "all") -> np.ndarray:
 
 
 class FlowShare(NamedTuple):
-    """Share of the kinetic energy of a gas that belongs to flows."""
+    """Fraction of the kinetic energy of a gas that is due to flows."""
 
-    share: float  # 0 on average for independent velocities, as in a homogeneous gas
-    p: float  # p-value of independent velocities
+    share: float  # on average 0 for independent velocities, as in a homogeneous gas
+    p: float  # p-value of the hypothesis that velocities are independent
 
     @property
     def homogeneous(self) -> bool:
-        """Whether the velocities are independent, or the share of the flows is negligible."""
+        """Whether the flows are statistically insignificant, or negligible."""
         return self.p >= UNLIKELY or self.share <= FLOWING
 
 
 def flow_share(runs: Sequence[Run], frame: int = -1) -> FlowShare:
-    """Measure the share of flows in the kinetic energy of cooling gases.
+    """Measure the fraction of the kinetic energy of cooling gases that is due to flows.
 
-    In a gas that is no longer homogeneous, neighbouring disks move in parallel. If velocities are
-    independent, the squared momentum of a cell of about 25 disks (`TOGETHER`) is on average the sum
-    of the squared momenta of its disks. Any excess over twice the mass of the cell is energy of a
-    flow.
+    When a gas becomes inhomogeneous, neighbouring disks begin to move in parallel. For independent
+    velocities, the squared momentum of a cell of about 25 disks (`TOGETHER`) is on average the sum
+    of the squared momenta of its disks. The excess, divided by twice the mass of the cell, is the
+    energy of a flow.
 
     Parameters
     ----------
     runs : sequence of Run
-        (R,) runs of one input, which differ by their seed
+        (R,) runs of one input that differ only in their seed
     frame : int
         index of the frame
 
     Returns
     -------
     FlowShare
-        share over all runs together and p-value of independent velocities; NaN without velocities
+        fraction in all runs together, and the p-value of independent velocities; the fraction is
+        NaN if the frames have no velocities
 
     Examples
     --------
@@ -197,11 +199,7 @@ def flow_share(runs: Sequence[Run], frame: int = -1) -> FlowShare:
 
 
 def cell_sums(run: Run, frame: int) -> tuple[float, float, float, float]:
-    """Return four sums over the cells of a frame.
-
-    They are the kinetic energy of flows, the total kinetic energy, the squared momenta of cells in
-    units of the variance of a component, and the number of these components.
-    """
+    """Return flow energy, kinetic energy, and chi^2 of the momenta of cells with its freedom."""
     momentum = run.mass[:, None] * (run.velocity[frame] - drift(run))
     side = np.sqrt(run.edges.prod() * TOGETHER / run.n_disks)
     cells = np.maximum(2, np.rint(run.edges / side)).astype(int)
@@ -216,7 +214,7 @@ def cell_sums(run: Run, frame: int) -> tuple[float, float, float, float]:
 
 
 def flow_notes(groups: Sequence[tuple[str, Sequence[Run]]]) -> list[str]:
-    """Return a note for each named group of gases that are not homogeneous at their end."""
+    """Return a note for each named group of gases that are inhomogeneous at the end."""
     notes = []
     for name, runs in groups:
         found = flow_share(cooled) if (cooled := [r for r in runs if r.nature.cooling]) else None
@@ -233,10 +231,10 @@ def flow_notes(groups: Sequence[tuple[str, Sequence[Run]]]) -> list[str]:
 
 
 def first_rate(run: Run) -> float:
-    """Return the initial collision rate w0 [1/time] of cooling smooth disks in a periodic box.
+    """Return the initial collision rate w0 [1/time] of smooth disks cooling in a periodic box.
 
-    w0 follows from the equation of state for equal disks, and from counted collisions for mixtures.
-    Refused is raised if Haff's law does not apply.
+    w0 is predicted by the equation of state for equal disks, and counted for mixtures. Refused is
+    raised if Haff's law does not apply.
     """
     law = "Haff's law is for smooth disks that only cool, in a periodic box"
     allow(run, law, *SMOOTH)
@@ -252,7 +250,7 @@ def first_rate(run: Run) -> float:
 
 
 def counted_rate(run: Run) -> float:
-    """Return the initial collision rate w0 from the first collisions, corrected for the cooling."""
+    """Return w0 from the collisions counted at first, corrected for the cooling meanwhile."""
     time, tau = run.collisions_per_disk
     first = min(int(np.searchsorted(tau, 1.0)), len(tau) - 1)
     slower = (1 - run.restitution**2) * tau[first] / 4
@@ -260,9 +258,9 @@ def counted_rate(run: Run) -> float:
 
 
 def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return w0 t, collisions per disk and energy over its initial value, each (T,), at samples.
+    """Return w0 t, collisions per disk and K / K(0) at each sample, all of shape (T,).
 
-    w0 is the initial collision rate. Refused is raised if Haff's law does not apply to the run.
+    Refused is raised if Haff's law does not apply to the run.
     """
     time, tau = run.collisions_per_disk
     energy = moving_energy(run)
@@ -270,10 +268,7 @@ def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def soft_law(runs: list[Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return the cooling law for a velocity-dependent restitution, or None if it is constant.
-
-    The law is an array each of w0 t, collisions per disk, and energy over its initial value.
-    """
+    """Return w0 t, tau and K / K(0) predicted for a velocity-dependent restitution, or None."""
     if "soft_contacts" not in runs[0].nature:
         return None
     thermal = np.mean([np.sqrt(kt_at_start(run) / run.mass[0]) for run in runs])
@@ -286,12 +281,12 @@ def haff(
     soft: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
     points: int = 200,
 ) -> tuple[Curves, Estimate, float, Estimate]:
-    """Compare the cooling of runs that have equal coefficients of restitution with Haff's law.
+    """Compare the cooling of runs with the same coefficient of restitution with Haff's law.
 
-    `tracks` are results of `energy_left`, and `soft` that of `soft_law`. Returned are curves
-    (points,) of the energy, its predictions and the cooling rate; the cooling rate per collision
-    or, with `soft`, the exponent of the decay in time; the collisions per disk at the end of the
-    homogeneous state, NaN if it lasts; and the same number with its error.
+    `tracks` are results of `energy_left`, and `soft` is that of `soft_law`. The function returns
+    the curves (points,) of the energy, its predictions and the cooling rate; the cooling rate per
+    collision or, with `soft`, the exponent of the decay in time; and the collisions per disk at
+    which the gas becomes inhomogeneous (NaN if never), without and with its error.
     """
     time = np.geomspace(max(t[1] for t, *_ in tracks), min(t[-1] for t, *_ in tracks), points)
     tau, by_tau = on_grid([c for _, c, _ in tracks], [(k, np.log(k)) for *_, k in tracks], points)
@@ -331,19 +326,13 @@ def haff(
 
 
 def exponent(time: np.ndarray, energy: np.ndarray) -> float:
-    """Fit p of K ~ t^-p in the last decade of times (T,) with equal ratios.
-
-    It is 2 by Haff's law and 5/3 for viscoelastic disks.
-    """
+    """Fit p of K ~ t^-p in the last decade of times (T,): 2 by Haff's law, 5/3 if viscoelastic."""
     late = time >= time[-1] / 10
     return float(-np.polyfit(np.log(time[late]), np.log(energy[late]), 1)[0])
 
 
 def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray) -> float:
-    """Return the collisions per disk after which a gas is no longer homogeneous, or NaN.
-
-    From then on, the cooling rate stays below `SLOW` times the rate predicted by the `law`.
-    """
+    """Return tau after which the cooling rate stays below `SLOW` times the `law`, or NaN."""
     slow = rate < SLOW * law
     if not slow[-1]:
         return float("nan")
@@ -354,7 +343,7 @@ def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray
 
 
 def rough_law(run: Run) -> tuple[float, float, float]:
-    """Return normal and tangential restitution, and moment of inertia over m r^2, of rough disks.
+    """Return normal and tangential restitution and I / (m r^2) of rough disks.
 
     Refused is raised if the theory of cooling rough disks does not apply to the run.
     """
@@ -369,16 +358,16 @@ def rough_law(run: Run) -> tuple[float, float, float]:
 
 
 def temperatures(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return both temperatures of rough disks, (T,) each, at the times of the observables."""
+    """Return translational and rotational temperature (T,) of rough disks at each sample."""
     kinds = "temperature", "rotational_temperature"
     t, rotational = (run.observable(f"all/{kind}").value for kind in kinds)
     return t, rotational
 
 
 def rough(runs: list[Run], points: int = 200) -> Curves:
-    """Average the temperatures of cooling rough disks over runs that differ by their seed.
+    """Average the temperatures of cooling rough disks over runs that differ only in their seed.
 
-    The curves (points,) are translational "T", rotational "T_rot" and their "ratio", at
+    The curves (points,) are "T" (translational), "T_rot" (rotational) and their "ratio" against
     "collisions_per_disk".
     """
     own = [run.collisions_per_disk.value for run in runs]
@@ -389,10 +378,7 @@ def rough(runs: list[Run], points: int = 200) -> Curves:
 
 
 def steady_ratio(runs: list[Run], law: tuple[float, float, float]) -> Estimate:
-    """Estimate the late, steady ratio of rotational to translational temperature.
-
-    `law` is the result of `rough_law`, with which the theoretical ratio is calculated.
-    """
+    """Estimate the late ratio of rotational to translational temperature, given `rough_law`."""
     ratios = []
     for run in runs:
         tau, (t, rotational) = run.collisions_per_disk.value, temperatures(run)

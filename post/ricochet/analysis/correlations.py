@@ -1,20 +1,21 @@
 """Time correlation functions of displacements, velocities and densities for each species.
 
-    from ricochet import correlations, read_run found =
-    correlations.measured([read_run("runs/glass.h5")], waves=[5.2], skip=0) found["small"]["msd"]
-    # a Curve: lags x, means y, errors
+    from ricochet import correlations, read_run
+    found = correlations.measured([read_run("runs/glass.h5")], waves=[5.2], skip=0)
+    found["small"]["msd"]                # a Curve: lags x, means y, errors
 
-Each function is an average over pairs of samples at t0 and t, as a function of the lag t - t0, for
-one species or for "all" disks. With the displacement r of a disk from t0 to t:
+Each function is a mean over pairs of samples at times t0 and t, as a function of the lag t - t0,
+for one species or for "all" disks. With r the displacement of a disk from t0 to t, they are:
 
-    msd        <r^2>, the mean square displacement vacf       <v(t0) v(t)>, the velocity
-    autocorrelation; the mean square speed at lag 0 diffusion  <v(t0) r> / 2, half the integral of
-    vacf; not for driven disks alpha2     <r^4> / (2 <r^2>^2) - 1, the non-Gaussian parameter: 0
-    where r is Gaussian overlap    fraction of the disks with r < `reach` [0.3 mean diameters]
+    msd        <r^2>, the mean square displacement
+    vacf       <v(t0) v(t)>, the velocity autocorrelation; the mean square speed at lag 0
+    diffusion  <v(t0) r> / 2, half the integral of vacf; not for driven disks
+    alpha2     <r^4> / (2 <r^2>^2) - 1, the non-Gaussian parameter, 0 for Gaussian r
+    overlap    fraction of the disks with r < `reach` [0.3 mean diameters]
     F_s(k)     <J0(k r)>, the mean of exp(i k r) over all directions, for each k of `waves`
 
-The choice of lags and origins and the errors are explained in docs/explanation/statistics.md, "Time
-correlations".
+The section "Time correlations" of docs/explanation/statistics.md explains how lags and time origins
+are chosen and errors are estimated.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -42,24 +43,25 @@ __all__ = [
 ]
 
 PER_DECADE = 12
-FEW_PAIRS = 0.125  # smallest number of pairs at a lag, relative to that at a shorter lag
-ORIGINS = 16  # origins per lag if not every sample is an origin
-BLOCKS = 16  # blocks of time, for errors
+FEW_PAIRS = 0.125  # fewest pairs at a lag, relative to the number at a shorter lag
+ORIGINS = 16  # time origins per lag if not every sample is an origin
+BLOCKS = 16  # blocks of time from which errors are estimated
 REACH = 0.3  # mean diameters
-CLOSE = 1e-9  # relative difference of lags that count as equal
-MOST_PAIRS = 2 * 10**6  # largest number of pairs whose lags are compared
+CLOSE = 1e-9  # relative difference below which two lags are equal
+MOST_PAIRS = 2 * 10**6  # largest number of pairs of samples whose lags are compared
 PATIENCE = 5.0  # time after which a terminal shows the progress [s]
-MOST_DISKS = 10**8  # largest number of disks in pairs of samples, if every sample is an origin
+# largest sum of disks over all pairs of samples for which every sample is an origin
+MOST_DISKS = 10**8
 FLOWING = {"sheared", "sliding_surfaces", "recycled", "changed"}
 FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
 
 
 def lags_of(times: np.ndarray) -> np.ndarray:
-    """Return lags (L,) [time] for samples at increasing times (T,): 0, and twelve per power of ten.
+    """Return 0 and twelve lags per decade, each with many pairs of the given samples, as lags (L,).
 
-    From each interval the lag with the most pairs of samples is taken. It is left out if it has
-    less than an eighth of the pairs of a shorter lag, apart from the decrease with the remaining
-    duration. ValueError is raised for fewer than two times, or times that do not increase.
+    The lag with the most pairs represents its interval, unless it has less than an eighth of the
+    pairs of a shorter lag, when both are corrected for the remaining duration. ValueError is raised
+    unless there are at least two `times` (T,) in increasing order.
     """
     if len(times) < 2 or not (np.diff(times) > 0).all():
         raise ValueError("lags require at least two times in increasing order")
@@ -73,29 +75,30 @@ def lags_of(times: np.ndarray) -> np.ndarray:
     order = np.lexsort((first, -pairs, part))
     _, best = np.unique(part[order], return_index=True)
     lags, pairs = apart[first[order[best]]], pairs[order[best]]
-    rest = 1 + (apart.min() - lags) / (times[-1] - times[0])  # in proportion to the largest number
+    # relative to the remaining duration at the shortest lag
+    rest = 1 + (apart.min() - lags) / (times[-1] - times[0])
     enough = pairs / rest >= FEW_PAIRS * np.maximum.accumulate(pairs / rest)
     return np.append(0, lags[enough])
 
 
 def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
-    """Return sampling times in bursts, which contain many pairs of samples at every lag.
+    """Return sampling times in bursts, which yield many pairs of samples at every lag.
 
-    Each burst has samples at logarithmically spaced times after its start, ten per power of ten.
+    Each burst consists of samples at logarithmically spaced times after its start, ten per decade.
 
     Parameters
     ----------
     first, last : float
-        shortest and longest time after the start of a burst [time]
+        shortest and longest time between the start of a burst and a later sample [time]
     apart : float
-        time between the starts of bursts [time]
+        time between the starts of successive bursts [time]
     until : float
-        latest possible time of a sample [time]
+        end of the schedule [time]
 
     Returns
     -------
     numpy.ndarray
-        (T,) increasing times, which start at 0
+        (T,) increasing times, starting at 0
 
     Raises
     ------
@@ -117,10 +120,11 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
 
 
 class Correlator:
-    """Time correlations of a run or a simulation, accumulated from samples one after the other.
+    """Time correlations of a run or a simulation, accumulated sample by sample.
 
-    Only samples with pairs still to come are stored, about 16 per lag in long runs. A pickled
-    correlator contains its complete state, so that a measurement can be continued exactly.
+    A sample is kept only as long as it can form pairs with later ones; in long runs about 16
+    samples per lag are kept. A pickled correlator stores its complete state, so that the
+    measurement continues exactly where it stopped.
     """
 
     def __init__(
@@ -131,7 +135,7 @@ class Correlator:
         reach: float | None = None,
         lags: np.ndarray | None = None,
     ):
-        """Set all sums to zero; by default, the lags are those selected by `lags_of`."""
+        """Start with empty sums, for the given lags or those that `lags_of` selects."""
         cools = {"inelastic"} if source.nature.cooling else set()
         what = "time correlations require a steady state without flow"
         allow(source, what, *TRAITS.keys() - FLOWING - cools)
@@ -149,17 +153,16 @@ class Correlator:
         self.every = len(self.times) * len(self.lags) * len(self.mass) <= MOST_DISKS
         self.pairs = np.zeros(size)
         self.sums = np.zeros((*size, len(self.names), len(FIXED) + len(self.waves)))
-        self.done = 0  # samples
-        self.held: dict[int, np.ndarray] = {}  # by sample: x, y, vx, vy (4, N)
-        self.ends: dict[int, list[int]] = {}  # by sample: origins whose last partner it is
-        self.due: dict[int, list[tuple[int, int]]] = {}  # by sample: (origin, lag)
-        self.last = np.full(len(self.lags), -1.0)  # slot of its last origin
+        self.done = 0  # number of samples added
+        self.held: dict[int, np.ndarray] = {}  # samples kept, by number: x, y, vx, vy (4, N)
+        # origins whose last partner is a sample, by its number
+        self.ends: dict[int, list[int]] = {}
+        # pairs (origin, lag) that a sample completes, by its number
+        self.due: dict[int, list[tuple[int, int]]] = {}
+        self.last = np.full(len(self.lags), -1.0)  # time interval of the last origin of each lag
 
     def follow(self, source: Run | Simulation) -> Self:
-        """Add the samples that follow the last added one, also of a run that has grown since.
-
-        A simulation is advanced to the times of the samples.
-        """
+        """Add the new samples of a run, which may have grown, or advance a simulation for them."""
         times = self.times[self.done :]
         look = {"delay": PATIENCE, "disable": None, "leave": False, "unit": "frame"}
         for place, velocity in tqdm(samples(source, times), total=len(times), **look):
@@ -167,7 +170,7 @@ class Correlator:
         return self
 
     def add(self, place: np.ndarray, velocity: np.ndarray) -> None:
-        """Add a sample: unwrapped positions (N, 2) and velocities (N, 2)."""
+        """Add a sample of unwrapped positions (N, 2) and velocities (N, 2)."""
         share = self.mass / self.mass.sum()
         state = np.concatenate(
             [(values - self.kept * (share @ values)).T for values in (place, velocity)]
@@ -193,7 +196,7 @@ class Correlator:
         self.done += 1
 
     def count(self, origins: np.ndarray, lags: np.ndarray, state: np.ndarray) -> None:
-        """Add P pairs, each of an earlier and the present sample, at the lags `lags`."""
+        """Add P pairs of earlier samples and the present one, at lags with the indices `lags`."""
         values = np.empty((len(FIXED) + len(self.waves), len(origins), state.shape[1]))
         for k, origin in enumerate(origins):
             self.evaluate(self.held[origin], state, values[:, k])
@@ -206,7 +209,7 @@ class Correlator:
         np.add.at(self.sums, where, np.moveaxis(values @ self.shares, 0, 2))
 
     def evaluate(self, before: np.ndarray, now: np.ndarray, values: np.ndarray) -> None:
-        """Write the `FIXED` amounts of each disk, for two samples (4, N), to `values` (F, N)."""
+        """Write the `FIXED` quantities of each disk, for two samples (4, N), to `values` (F, N)."""
         square, fourth, memory, half, overlap = values[: len(FIXED)]
         x, y = now[:2] - before[:2]
         vx, vy = before[2:]
@@ -217,27 +220,24 @@ class Correlator:
         np.less(square, self.reach**2, out=overlap)
 
     def amounts(self, name: str, species: int) -> np.ndarray:
-        """Return sums (L, B) at L lags over the pairs that start in each of B blocks of time."""
+        """Return sums (L, B) over the pairs at L lags that start in each of B blocks of time."""
         names = (*FIXED, *(f"F_s({k:g})" for k in self.waves))
         if name != "alpha2":
             return self.sums[:, :, species, names.index(name)]
         square, fourth = np.moveaxis(self.sums[:, :, species, :2], 2, 0)
         number = np.maximum(self.pairs.sum(axis=1, keepdims=True), 1)
         m2, m4 = (part.sum(axis=1, keepdims=True) / number for part in (square, fourth))
-        m2 = np.where(m2 > 0, m2, np.nan)  # to first order in the deviations of the blocks:
+        m2 = np.where(m2 > 0, m2, np.nan)  # to first order in the deviations of the blocks
         return fourth / (2 * m2**2) - m4 / m2**3 * square + (m4 / m2**2 - 1) * self.pairs
 
     def means(self, name: str, species: int = 0) -> np.ndarray:
-        """Return the means (L,) over all pairs at each lag, or NaN at lags without pairs."""
+        """Return the mean (L,) over all pairs at each lag, NaN where there are none."""
         number = self.pairs.sum(axis=1)
         return self.amounts(name, species).sum(axis=1) / np.where(number > 0, number, np.nan)
 
 
 def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield unwrapped positions and velocities at the given times, or up to the end of a run.
-
-    A simulation is advanced to the given times.
-    """
+    """Yield unwrapped positions and velocities at given times; a simulation is advanced."""
     if isinstance(source, Simulation):
         box = source.parameters["box"]
         edges = np.subtract(box["upper"], box["lower"])
@@ -256,7 +256,7 @@ def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.nd
 
 
 def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.ndarray) -> Estimate:
-    """Return means and errors of a correlation function at the lags with the given indices."""
+    """Return a correlation function with its errors at the lags that have the indices `lags`."""
     means = [one.means(name, species)[lags] for one in members]
     if len(means) > 1:
         return estimate(means)
@@ -270,12 +270,12 @@ def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.nda
 
 
 def curves(members: Sequence[Correlator]) -> dict[str, dict[str, Curve]]:
-    """Return the correlation functions measured by several correlators.
+    """Return the correlation functions accumulated by several correlators.
 
     Parameters
     ----------
     members : sequence of Correlator
-        (R,) correlators of runs that differ by their seed, with equal lags
+        (R,) correlators, with equal lags, of runs that differ only in their seed
 
     Returns
     -------
@@ -307,9 +307,8 @@ def correlators(
 ) -> list[Correlator]:
     """Return a correlator of each run in its steady state, with the lags of the first run.
 
-    `waves` are wavenumbers of F_s(k, t) [1/length], and `reach` is the displacement below which a
-    disk overlaps with its earlier position [0.3 mean diameters]. RunError is raised if a run has
-    too few frames, or no lag in common with the first run.
+    The parameters are those of `measured`. RunError is raised if a run has too few frames, or no
+    lag in common with the first run.
     """
     refuse_others(runs)
     times = [run.time[later(run, skip)] for run in runs]
@@ -327,15 +326,16 @@ def correlators(
 
 
 def measured(runs: Sequence[Run], **options: Any) -> dict[str, dict[str, Curve]]:
-    """Compute the time correlation functions of runs that differ by their seed.
+    """Compute the time correlation functions of runs that differ only in their seed.
 
     Parameters
     ----------
     runs : sequence of Run
         (R,) runs of the same disks
     **options : object
-        `waves`, wavenumbers k [1/length]; `reach`, the displacement below which disks overlap [0.3
-        mean diameters]; `skip`, collisions per disk that are left out [until no observable drifts]
+        `waves`, wavenumbers k of F_s(k) [1/length]; `reach`, the displacement below which a disk
+        overlaps with its earlier position [0.3 mean diameters]; `skip`, collisions per disk
+        discarded as equilibration [until no observable drifts]
 
     Returns
     -------

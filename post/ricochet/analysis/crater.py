@@ -1,7 +1,7 @@
-"""Craters: identify projectile and bed, and measure the size of the crater.
+"""Impacts: identify projectile and bed, and measure the size of the crater.
 
-The projectile is the disk of the species 'projectile' or, without such a species, the only disk
-that moves at the start. All other disks form the bed.
+The projectile is the disk of the species 'projectile' or, if there is no such species, the only
+disk that moves initially. All other disks form the bed.
 """
 
 from typing import Any, NamedTuple
@@ -23,21 +23,21 @@ __all__ = [
 
 
 class Crater(NamedTuple):
-    """The size of a crater by several definitions, and the end of the run."""
+    """Size of a crater by several definitions, and the state at the end of the run."""
 
     hit: int
     displaced: int
-    width: float  # extent of the initial positions of the displaced disks
+    width: float  # horizontal extent of the initial positions of the displaced disks
     depth: float
     hole_width: float
     hole_depth: float
-    energy_left: float  # divided by the initial energy
+    energy_left: float  # relative to the initial energy
     time: float
     collisions: int
     side_collisions: int
 
 
-# Traits of `nature` that a run with a crater may have, because they do not set the bed in motion.
+# Traits of `nature` that are allowed because they do not set the bed in motion.
 QUIET: tuple[str, ...]
 QUIET = (
     "inelastic",
@@ -50,37 +50,34 @@ QUIET = (
     "walls",
 )
 QUIET += ("time_stepped",)
-FEW_HITS = 0.01  # wall collisions per disk up to which the box has no influence
+FEW_HITS = 0.01  # wall collisions per disk up to which the box does not affect the crater
 HIT_OVER_LEAST = 3.4  # number of disks hit, divided by M (1/f - 1) / (1 - xi^2)
-# number of disks of a sufficiently large bed, divided by the number of disks hit
+# disks in a sufficiently large bed, divided by the number of disks hit
 BED_OVER_HIT = 2.2
 
 
 def energy_fraction(run: Run) -> float:
-    """Return `stop.energy_fraction`, the fraction of the initial energy at which the run ends."""
+    """Return the fraction of the initial energy at which the run ends (`stop.energy_fraction`)."""
     return float(run.parameter("stop", "energy_fraction", 0.1))
 
 
 def ended_by_time(run: Run, size: Crater) -> bool:
-    """Return whether the energy left at the end exceeds `stop.energy_fraction`."""
+    """Return whether the run ended before its energy fell to `stop.energy_fraction`."""
     return size.energy_left > energy_fraction(run) * (1 + 1e-9)
 
 
 def box_takes_part(run: Run, side_collisions: float) -> bool:
-    """Return whether more collisions with the sides than one per hundred disks affect the crater.
-
-    `side_collisions` may be a mean over runs.
-    """
+    """Return whether the sides, with more than 0.01 collisions per disk, affect the crater."""
     return side_collisions > FEW_HITS * run.n_disks
 
 
 def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> float:
-    """Estimate the number of disks with which the crater does not reach the sides of the box.
+    """Estimate the number of disks in a bed whose crater does not reach the sides of the box.
 
-    A large bed has about 3.4 M (1/f - 1) / (1 - xi^2) hit disks, and 2.2 times as many suffice.
-    Both factors were measured in a square box half filled at a packing fraction of 0.5, with M from
-    10 to 50, xi from 0.3 to 0.8, ratios of radii from 2 to 10 and f = 0.1. The number is infinite
-    for xi = 1 or f = 0.
+    In a large bed about 3.4 M (1/f - 1) / (1 - xi^2) disks are hit, and a bed of 2.2 times as many
+    disks suffices. Both factors were measured in a square box, half filled at a packing fraction of
+    0.5, for M from 10 to 50, xi from 0.3 to 0.8, ratios of radii from 2 to 10 and f = 0.1. The
+    result is infinite for xi = 1 or f = 0.
     """
     if restitution >= 1 or fraction <= 0:
         return float("inf")
@@ -89,12 +86,12 @@ def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> floa
 
 
 def projectile(run: Run) -> int:
-    """Find the projectile of a run.
+    """Find the projectile of an impact.
 
     Parameters
     ----------
     run : ricochet.Run
-        a run of a crater
+        a run of an impact
 
     Returns
     -------
@@ -104,7 +101,7 @@ def projectile(run: Run) -> int:
     Raises
     ------
     RunError
-        if no species is called 'projectile', and not exactly one disk moves at the start
+        if no species is called 'projectile' and the number of initially moving disks is not one
 
     Examples
     --------
@@ -129,7 +126,7 @@ def bed(run: Run) -> np.ndarray:
 
 
 def displaced(run: Run, frame: int = -1) -> np.ndarray:
-    """Return a mask (N,) of the bed disks displaced by more than their radius in a frame."""
+    """Return a mask (N,) of the bed disks displaced by more than their own radius."""
     return bed(run) & (run.displacement(frame) > run.radius)
 
 
@@ -139,17 +136,17 @@ def crater(run: Run) -> Crater:
     Parameters
     ----------
     run : ricochet.Run
-        a run in which a projectile meets a bed at rest
+        a run in which a projectile hits a bed at rest
 
     Returns
     -------
     Crater
-        sizes by several definitions, and the state at the end of the run
+        size of the crater by several definitions, and the state at the end of the run
 
     Raises
     ------
     Refused
-        if anything other than a projectile can move the bed
+        if anything other than the projectile can set the bed in motion
 
     Examples
     --------
@@ -180,20 +177,20 @@ def crater(run: Run) -> Crater:
 
 
 def hole(run: Run) -> np.ndarray:
-    """Return the outline of the hole made by the projectile in the bed.
+    """Return the outline of the hole that the projectile leaves in the bed.
 
-    It is the largest region in which the local packing fraction is below half of its initial
-    median.
+    The hole is the largest region in which the local packing fraction is less than half of its
+    initial median.
 
     Parameters
     ----------
     run : ricochet.Run
-        a run of a crater
+        a run of an impact
 
     Returns
     -------
     numpy.ndarray
-        (P, 2) closed line [length], which is empty if the bed has no hole
+        (P, 2) vertices of a closed line [length]; empty if the bed has no hole
 
     Examples
     --------
@@ -216,7 +213,7 @@ def area(ring: np.ndarray) -> float:
 
 
 def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, ...]:
-    """Return x and y of grid cells, and the smoothed packing fraction (y, x) of the bed."""
+    """Return x and y of cell centres, and the smoothed packing fraction (y, x) of the bed."""
     here = bed(run)
     side = run.edges.max() / cells
     shape: Any = np.maximum(1, np.round(run.edges / side)).astype(int)

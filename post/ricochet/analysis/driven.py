@@ -1,4 +1,4 @@
-"""Time series of driven systems, with predicted values."""
+"""Time series of driven systems, and the values predicted for them."""
 
 from typing import NamedTuple
 
@@ -10,13 +10,13 @@ from ..reading.reader import SIDES, Run
 from .structure import largest_cluster
 from .thermodynamics import packing
 
-GAP = 0.1  # largest gap in a cluster [mean diameters]
+GAP = 0.1  # largest gap between neighbours in a cluster [mean diameters]
 TimeSeries = tuple[np.ndarray, np.ndarray]  # times (S,) and values (S,)
-Curves = dict[str, TimeSeries]  # by species; the key "" means all disks
+Curves = dict[str, TimeSeries]  # by species; "" stands for all disks
 
 
 def temperature(run: Run) -> Curves:
-    """Return the time series of the temperature relative to the mean velocity."""
+    """Return the temperature as a function of time, relative to the mean velocity."""
     if run.n_disks < 2:
         raise Refused(
             f"{run.path}: holds one disk; a temperature requires at least two, as it is "
@@ -32,7 +32,7 @@ def temperature(run: Run) -> Curves:
 
 
 def components(run: Run) -> Curves:
-    """Return the time series of kT_x and kT_y of all disks, relative to their mean velocity."""
+    """Return kT_x and kT_y of all disks as functions of time, relative to their mean velocity."""
     time, tensor = run.observable("kinetic_tensor")
     motion = 0 if run.shear_rate else run.observable("momentum").value ** 2 / run.mass.sum()
     kt = (tensor[:, [0, 3]] - motion) / (run.n_disks - 1)
@@ -40,7 +40,7 @@ def components(run: Run) -> Curves:
 
 
 def keeps_energy(run: Run) -> bool:
-    """Return whether the kinetic energy is constant in the second half of the run."""
+    """Return whether the kinetic energy is conserved in the second half of the run."""
     time, energy = run.observable("all/kinetic_energy")
     late = energy[time >= (time[0] + time[-1]) / 2]
     return bool(np.ptp(late) < ROUNDING * np.max(late, initial=0))
@@ -58,7 +58,7 @@ def noise_law(run: Run) -> float | None:
 
 
 def temperature_law(run: Run) -> np.ndarray | float | None:
-    """Return the temperature of the steady state, or the temperatures on the adiabat."""
+    """Return the steady temperature, or the temperatures (S,) during an adiabatic compression."""
     side = only_moving(run, "constant_velocity")
     if side is None:
         return noise_law(run)
@@ -67,40 +67,40 @@ def temperature_law(run: Run) -> np.ndarray | float | None:
 
 
 def only_moving(run: Run, motion: str) -> int | None:
-    """Return the index of the only moving side of a box of equal elastic disks, or None."""
+    """Return the only moving side if its motion is `motion` and the disks are equal and elastic."""
     moves = [k for k, side in enumerate(run.sides) if side.get("motion", "still") != "still"]
     plain = run.nature <= {"moving_sides", "piston", "walls", "rotating"} and len(moves) == 1
     return moves[0] if plain and run.sides[moves[0]]["motion"] == motion else None
 
 
 def widths(run: Run, side: int) -> np.ndarray:
-    """Return the widths (S,) of the box along the motion of a side, at S samples."""
+    """Return the width of the box along the motion of a side, at each of S samples."""
     lower, upper = run.corners_at(run.observable("total_energy").time)
     return (upper - lower)[:, side // 2]
 
 
 def adiabat(run: Run, side: int, widths: np.ndarray) -> np.ndarray:
-    """Return the temperatures on the adiabat, divided by the temperature at the initial width."""
+    """Return the temperatures on the adiabat, relative to that at the initial width."""
     height, walled = float(run.edges[1 - side // 2]), not run.periodic[1 - side // 2]
     return hard_disks.adiabat(widths, height, run.n_disks, float(run.radius[0]), walled)
 
 
 def width(run: Run) -> Curves:
-    """Return the width of the box along the direction in which its piston moves."""
+    """Return the width of the box along the motion of its piston as a function of time."""
     if not run.piston_positions:
         raise Refused(f"{run.path}: has no piston (side.motion = 'piston')")
     return {"": (run.observable("total_energy").time, widths(run, min(run.piston_positions)))}
 
 
 class Room(NamedTuple):
-    """Predicted mean and standard deviation of the fluctuating width of a box."""
+    """Predicted mean and standard deviation of the width of a box with a piston."""
 
     mean: float
     deviation: float
 
 
 def width_law(run: Run) -> Room | None:
-    """Return the predicted width of a box at constant enthalpy, for a piston initially at rest."""
+    """Return the predicted width at constant enthalpy, for a piston initially at rest, or None."""
     side = only_moving(run, "piston")
     if side is None or not run.sides[side]["force"] > 0:
         return None
@@ -117,7 +117,7 @@ def width_law(run: Run) -> Room | None:
 
 
 def balances(run: Run) -> tuple[float, float]:
-    """Return the largest relative changes of the enthalpy and of the total momentum in a run."""
+    """Return the largest relative changes of enthalpy and total momentum during a run."""
     k = min(run.piston_positions)
     side = run.sides[k]
     time, energy = run.observable("total_energy")
@@ -131,17 +131,17 @@ def balances(run: Run) -> tuple[float, float]:
 
 
 def share(run: Run) -> Curves:
-    """Return the fraction of the disks in the left half of the box in each frame."""
+    """Return the fraction of the disks in the left half of the box as a function of time."""
     middle = run.lower[0] + run.edges[0] / 2
     return {"": (run.time, np.mean(run.position[:][..., 0] < middle, axis=1))}
 
 
 def fuller(share: np.ndarray) -> np.ndarray:
-    """Return the fractions (T,) of disks in the fuller half of the box, from those in its left.
+    """Return the fractions (T,) of disks in the fuller half, given those in the left half.
 
-    For frames in the first third of the run, the last third decides which half is fuller, and vice
-    versa. With the same frames for both, chance would raise the mean fraction above 1/2; the middle
-    third is left out to keep the others independent.
+    The last third of the run decides which half is the fuller one in the first third, and vice
+    versa. If the same frames served both purposes, chance alone would raise the mean fraction above
+    1/2. The middle third is left out to keep the other two independent.
     """
     third = max(1, len(share) // 3)
     ends = share[:third], share[-third:]
@@ -150,7 +150,7 @@ def fuller(share: np.ndarray) -> np.ndarray:
 
 
 def demon_law(run: Run) -> float | None:
-    """Return the predicted steady fraction of disks in the half that contains more disks."""
+    """Return the predicted steady fraction of the disks that are in the fuller half."""
     floor = run.parameters.get("side", {}).get("bottom", {})
     middle = run.lower[0] + run.edges[0] / 2
     parting = [wall for wall in run.walls if np.allclose(wall[:, 0], middle)]
@@ -168,7 +168,7 @@ def demon_law(run: Run) -> float | None:
 
 
 def height(run: Run) -> Curves:
-    """Return the mean height of each species above the floor in each frame."""
+    """Return the mean height of each species above the floor as a function of time."""
     y = run.position[:][..., 1] - run.lower[1]
     several = len(run.names) > 1
     return {
@@ -177,14 +177,14 @@ def height(run: Run) -> Curves:
 
 
 def cluster(run: Run) -> Curves:
-    """Return the fraction of the disks in the largest cluster in each frame."""
+    """Return the fraction of the disks in the largest cluster as a function of time."""
     gap = GAP * 2 * float(run.radius.mean())
     shares = [largest_cluster(run, frame, gap) / run.n_disks for frame in range(run.n_frames)]
     return {"": (run.time, np.array(shares))}
 
 
 def viscosity(run: Run) -> Curves:
-    """Return the time series of the viscosity, which is -P_xy divided by the shear rate."""
+    """Return the viscosity, -P_xy over the shear rate, as a function of time."""
     if "sheared" not in run.nature:
         raise Refused(f"{run.path}: is not sheared; --show viscosity requires box.shear_rate")
     if "random_walk" in run.nature:

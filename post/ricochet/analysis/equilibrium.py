@@ -1,7 +1,7 @@
-"""Steady states of runs, the thermal motion of disks, and kT as a function of time.
+"""Steady states, the thermal motion of disks, and kT as a function of time.
 
-In many functions `skip` is the duration of the equilibration in collisions per disk, whose samples
-are left out. If it is None, the duration is determined from the data.
+`skip` is the number of collisions per disk discarded as equilibration; None determines it from the
+data.
 """
 
 from collections.abc import Sequence
@@ -23,19 +23,19 @@ __all__ = [
     "start_of_steady_state",
 ]
 
-CLEAR = 3.0  # difference of two means that counts as significant, in standard deviations
-ENOUGH = 50  # independent samples with which the variance of a mean is well known
-SPEEDS_FORGET = 15.0  # collisions per disk after which speeds are independent of the start
+CLEAR = 3.0  # difference of two means that counts as significant [standard deviations]
+ENOUGH = 50  # independent samples that suffice to estimate the variance of a mean
+SPEEDS_FORGET = 15.0  # collisions per disk after which speeds are independent of the initial ones
 ALONG_WALLS = {
     "thermal_walls",
     "rough",
     "rotating",
     "inelastic",
-}  # traits with which walls may change the momentum along them
+}  # traits of walls that may change the tangential momentum
 
 
 def refuse_others(runs: Sequence[Run]) -> None:
-    """Raise an error unless all runs have the same species with the same numbers of disks."""
+    """Raise RunError unless the runs agree in their species and in the number of disks of each."""
     for run in runs:
         if run.names != runs[0].names or not np.array_equal(run.species, runs[0].species):
             raise RunError(f"{run.path}: its disks are not those of {runs[0].path}")
@@ -53,10 +53,10 @@ def all_settle(runs: Sequence[Run]) -> bool:
 
 
 def after_start(run: Run, skip: float | None = None) -> float:
-    """Return the time after which `skip` collisions per disk have occurred.
+    """Return the time at which `skip` collisions per disk have occurred.
 
-    The default is `SPEEDS_FORGET`, 15 collisions per disk, but at most half of those in the whole
-    run. Without collisions, the time is half the duration of the run unless `skip` is given.
+    By default these are 15 (`SPEEDS_FORGET`), but at most half of those in the run. In a run
+    without collisions, the default is half of its duration.
     """
     time = np.union1d(run.time, run.collisions_per_disk.time)
     tau = run.collisions_per_disk_at(time)
@@ -71,18 +71,18 @@ def after_start(run: Run, skip: float | None = None) -> float:
 
 
 def start_of_steady_state(run: Run, skip: float | None = None) -> float:
-    """Return the time after which collision rate and energies of the species no longer drift.
+    """Return the time after which the collision rate and the energies of the species do not drift.
 
-    Unless `skip` is given, at least 15 collisions per disk (`SPEEDS_FORGET`) are left out, during
-    which the speeds relax, or the first half of a run with fewer than 30. Drifts are sought in the
-    samples of the observables or, if these are few, in the frames.
+    Unless `skip` is given, at least 15 collisions per disk (`SPEEDS_FORGET`), during which the
+    speeds relax, are discarded, but never more than half of the run for this reason alone. Drifts
+    are sought in the observables or, if these have few samples, in the frames.
 
     Parameters
     ----------
     run : ricochet.Run
         any run
     skip : float, optional
-        collisions per disk that are left out [until no observable drifts]
+        collisions per disk discarded as equilibration [until no observable drifts]
 
     Returns
     -------
@@ -99,7 +99,7 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
 
 
 def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
-    """Return the time after which a run is steady, and an explanation of this choice."""
+    """Return the time after which a run is steady, with the reason for this choice."""
     forgets = f"{SPEEDS_FORGET:g} collisions per disk, the relaxation time of speeds"
     if skip is not None:
         return after_start(run, skip), f"--equilibration {skip:g}"
@@ -118,11 +118,11 @@ def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
 
 
 def relaxed_start(run: Run, skip: float | None = None) -> tuple[float, str]:
-    """Return the time after which a gas has relaxed, and an explanation of this choice.
+    """Return the time after which a gas has relaxed, with the reason for this choice.
 
-    Only 15 collisions per disk (`SPEEDS_FORGET`) are left out, unless an observable differs
-    significantly before and after the time at which it seems to stop drifting. By noise alone,
-    `explained_start` leaves out a tenth of a steady run on average.
+    Only 15 collisions per disk (`SPEEDS_FORGET`) are discarded, unless an observable before the end
+    of its apparent drift differs significantly from its later values. `explained_start` is
+    stricter: owing to noise, it discards on average a tenth of a run that is steady throughout.
     """
     start, reason = explained_start(run, skip)
     time, series = examined(run)
@@ -139,9 +139,9 @@ def relaxed_start(run: Run, skip: float | None = None) -> tuple[float, str]:
 
 
 def has_changed(values: np.ndarray, first: int, end: int) -> bool:
-    """Return whether the mean of values[first:end] differs significantly from that of the rest.
+    """Return whether the mean of values[first:end] differs from that of the rest, or may do so.
 
-    They also count as different if the rest has too few independent samples for a test.
+    The two means also count as different if the rest has too few independent samples for a test.
     """
     before, after = values[first:end], values[end:]
     if len(before) == 0:
@@ -154,12 +154,13 @@ def has_changed(values: np.ndarray, first: int, end: int) -> bool:
 
 
 def examined(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return times (T,) and the series (T - 1,) tested for drifts, if there are enough samples."""
+    """Return times (T,) and series (T - 1,) to be tested for drifts (none for too few samples)."""
     few = has_few_observables(run)
     time = run.time if few else run.collisions_per_disk.time
     if len(time) < 2 * FEWEST:
         return time, {}
-    apart = np.maximum(np.diff(time), 1e-9 * np.mean(np.diff(time)))  # two samples at the same time
+    # two samples may have the same time
+    apart = np.maximum(np.diff(time), 1e-9 * np.mean(np.diff(time)))
     series = {"collision rate": np.diff(run.collisions_per_disk_at(time)) / apart}
     if len(run.names) == 1 and run.nature.keeps_kinetic_energy:
         return time, series
@@ -185,7 +186,7 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
     run : ricochet.Run
         any run
     skip : float, optional
-        collisions per disk that are left out [until no observable drifts]
+        collisions per disk discarded as equilibration [until no observable drifts]
 
     Returns
     -------
@@ -210,7 +211,7 @@ def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
 def frames_from(
     run: Run, start: float, apart: float = 0.0, frames: list[int] | None = None
 ) -> list[int]:
-    """Select frames after a given time, with a minimum number of collisions between them.
+    """Select frames after a given time, separated by a minimum number of collisions.
 
     Parameters
     ----------
@@ -226,7 +227,7 @@ def frames_from(
     Returns
     -------
     list of int
-        numbers of the frames
+        indices of the selected frames
 
     Examples
     --------
@@ -244,7 +245,7 @@ def frames_from(
 
 
 def later(run: Run, skip: float | None = None) -> slice:
-    """Return the frames in the steady state, except the last, whose interval may differ."""
+    """Return the frames in the steady state except the last, which may end a shorter interval."""
     first = int(np.searchsorted(run.time, start_of_steady_state(run, skip)))
     if run.n_frames - 1 - first < 2:
         raise RunError(f"{run.path}: needs more frames after the start")
@@ -255,7 +256,7 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 
 def motion_notes(runs: Sequence[Run]) -> list[str]:
-    """Return a note for figures if noise moves the centre of mass, to which motion is relative."""
+    """Return a note for figures if noise accelerates the centre of mass, the frame of reference."""
     walks = any("random_walk" in run.nature for run in runs)
     note = "noise moves the centre of mass (drive.keep_momentum): motion is measured relative to it"
     return [note] * walks
@@ -264,8 +265,8 @@ def motion_notes(runs: Sequence[Run]) -> list[str]:
 def unforced(source: Run | Simulation) -> np.ndarray:
     """Return a mask (2,) of the axes along which only noise changes the total momentum.
 
-    Tangential forces of walls (traits `ALONG_WALLS`) are neglected. RunError is raised if noise
-    moves the centre of mass and friction at walls may stop it.
+    Tangential forces of walls (`ALONG_WALLS`) are neglected. Refused is raised if noise accelerates
+    the centre of mass while friction at walls may decelerate it.
     """
     box, nature = source.parameters.get("box", {}), source.nature
     if nature & (KICKED - {"noise_driven"}) or nature & {"obstacles", "changed"}:
@@ -279,15 +280,15 @@ def unforced(source: Run | Simulation) -> np.ndarray:
 
 
 def conserved_momentum(source: Run | Simulation) -> np.ndarray:
-    """Return a mask (2,) of the axes along which only noise, and no wall, changes the momentum."""
+    """Return a mask (2,) of the axes along which no wall changes the momentum (noise may)."""
     walls = "walls" in source.nature and source.nature & ALONG_WALLS
     return unforced(source) & (not walls)
 
 
 def comoving(run: Run) -> np.ndarray:
-    """Return a mask (2,) of the axes along which motion is relative to the centre of mass.
+    """Return a mask (2,) of the axes along which velocities are relative to the centre of mass.
 
-    These are the axes along which the total momentum is conserved, or changed only by noise.
+    Along these axes the total momentum is conserved, or changed only by noise.
     """
     kept = unforced(run)
     if run.nature & ALONG_WALLS and "random_walk" not in run.nature:
@@ -297,10 +298,10 @@ def comoving(run: Run) -> np.ndarray:
 
 
 def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.ndarray:
-    """Return the energies m v^2 / 2 (F, N) of the thermal motion of disks in the given frames.
+    """Return the energies m v^2 / 2 (F, N) of the thermal motion in the given frames.
 
     v is relative to the shear flow and, along the axes of `comoving`, to the centre of mass. If
-    `component` is 0 or 1, only the x or the y component of v is used.
+    `component` is 0 or 1, only the x or the y component of v contributes.
     """
     frames = chosen(run.n_frames, frames)
     velocity = run.velocity[frames]
@@ -313,15 +314,12 @@ def thermal_energy(run: Run, frames: Index, component: int | None = None) -> np.
 
 
 def free_disks(run: Run) -> float:
-    """Return the effective number of disks, N - k / 2 if momentum is conserved along k axes.
-
-    The total kinetic energy is this number times kT.
-    """
+    """Return the kinetic energy over kT: N - k / 2 if momentum is conserved along k axes."""
     return float(run.n_disks - comoving(run).sum() / 2)
 
 
 def drift(run: Run) -> np.ndarray:
-    """Return the velocity (2,) of the centre of mass; components that vary in time are set to 0."""
+    """Return the velocity (2,) of the centre of mass, with 0 for components that vary in time."""
     centre = np.average(run.velocity[0], axis=0, weights=run.mass)
     return np.where(comoving(run), centre, 0.0)
 
@@ -353,14 +351,14 @@ def kt_at_start(run: Run) -> float:
 
 
 def has_few_observables(run: Run) -> bool:
-    """Return whether a run has few samples of the observables, and more frames than samples."""
+    """Return whether a run has few samples of the observables, and fewer samples than frames."""
     return len(run.collisions_per_disk.time) < min(run.n_frames, 2 * FEWEST)
 
 
 def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
-    """Return a time series of kT: its source ("observables" or "frames"), its times and its values.
+    """Return kT as a function of time: source, times (T,) and values (T,).
 
-    The source is "frames" if there are few samples of the observables and more frames than that.
+    The source is "observables" or, if these have few samples, "frames".
     """
     if not has_few_observables(run):
         time, energy = run.observable("all/kinetic_energy")

@@ -1,4 +1,4 @@
-"""Means, densities and fits of independent values, with errors, and goodness-of-fit tests."""
+"""Means, densities and fits of independent values with their errors, and goodness-of-fit tests."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -24,34 +24,34 @@ __all__ = [
     "rounded_to_error",
 ]
 
-FEWEST_RUNS = 4  # smallest number of runs whose scatter counts as measured
-UNLIKELY = 0.005  # probability below which a deviation is regarded as significant
-MANY = 1e12  # degrees of freedom of an exactly known error
+FEWEST_RUNS = 4  # fewest runs whose scatter is regarded as a measured error
+UNLIKELY = 0.005  # p-value below which a deviation is significant
+MANY = 1e12  # degrees of freedom of an error that is known exactly
 ONE_SIGMA = 0.5 * math.erfc(-math.sqrt(0.5))  # importing scipy.special takes a third of a second
 
 
 class Estimate(NamedTuple):
-    """Mean with its error, which is half the width of the 68 % confidence interval."""
+    """Mean with its error: half the width of the 68 % confidence interval."""
 
     mean: Any  # a number, or an array of any shape
-    error: Any  # same shape as the mean
+    error: Any  # of the same shape
 
 
 class Curve(NamedTuple):
-    """A curve of P points (x, y), with the errors of y."""
+    """Curve of P points (x, y), with the errors of y."""
 
     x: np.ndarray
     y: np.ndarray
-    error: np.ndarray  # NaN where there is no error
+    error: np.ndarray  # NaN where the error is unknown
 
 
 class LawTest(NamedTuple):
-    """Result of a test that compares a sample with a distribution."""
+    """Result of comparing a sample with a distribution."""
 
     n: int  # number of independent values
-    ks: float  # Kolmogorov-Smirnov distance: the largest between the two distribution functions
-    ks_p: float  # probability of a larger distance by chance
-    chi2: float  # per degree of freedom, bins of equal probability
+    ks: float  # Kolmogorov-Smirnov distance: largest difference of the distribution functions
+    ks_p: float  # probability that chance alone causes a larger distance
+    chi2: float  # per degree of freedom, for bins of equal probability
     chi2_p: float
 
 
@@ -59,9 +59,9 @@ class LawFit(NamedTuple):
     """K parameters of a law fitted to points, with their errors."""
 
     values: np.ndarray  # (K,)
-    errors: np.ndarray  # (K,) half the 68 % intervals
-    chi2: float = float("nan")  # chi^2 per degree of freedom; NaN if the points have no errors
-    missed: bool = False  # whether points deviate from the law by more than their errors explain
+    errors: np.ndarray  # (K,) half the width of the 68 % intervals
+    chi2: float = float("nan")  # per degree of freedom; NaN if the points have no errors
+    missed: bool = False  # whether the deviations from the law are larger than the errors explain
 
 
 class PowerLaw(NamedTuple):
@@ -70,8 +70,8 @@ class PowerLaw(NamedTuple):
     factor: float
     exponent: float
     exponent_error: float
-    chi2: float = float("nan")  # chi^2 per degree of freedom, of the best line
-    missed: bool = False  # whether points deviate from the law by more than their errors explain
+    chi2: float = float("nan")  # per degree of freedom, of the best line
+    missed: bool = False  # whether the deviations from the law are larger than the errors explain
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         return self.factor * np.asarray(x, dtype=float) ** self.exponent
@@ -80,18 +80,18 @@ class PowerLaw(NamedTuple):
 def goodness_of_fit(
     sample: np.ndarray, cdf: Law, bins: int = 30, independent: int | None = None
 ) -> LawTest:
-    """Compare a sample with a distribution by Kolmogorov-Smirnov and chi-square tests.
+    """Compare a sample with a distribution by a Kolmogorov-Smirnov and a chi-square test.
 
     Parameters
     ----------
     sample : numpy.ndarray
         (n,) values
     cdf : callable
-        distribution function, which takes an array
+        cumulative distribution function, applied to an array
     bins : int
         number of bins of equal probability for the chi-square test
     independent : int, optional
-        effective number of independent values, if they are correlated [n]
+        effective number of independent values if they are correlated [n]
 
     Returns
     -------
@@ -118,15 +118,12 @@ def goodness_of_fit(
 
 
 def student(samples: ArrayLike) -> Any:
-    """Return Student's factor t, half the 68 % interval of a mean over its standard error.
-
-    `samples` (...) are numbers of independent samples; t tends to 1 for many.
-    """
+    """Return Student's t of 68 % intervals for numbers of independent samples (...); 1 for many."""
     return scipy.special.stdtrit(np.clip(np.subtract(samples, 1.0), 1.0, MANY), ONE_SIGMA)
 
 
 def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
-    """Estimate a mean and its error from independent values, such as those of several runs.
+    """Estimate a mean and its error from independent values, such as the results of several runs.
 
     Parameters
     ----------
@@ -138,7 +135,7 @@ def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
     Returns
     -------
     Estimate
-        (...) mean, and half its 68 % interval by Student's t; NaN for a single value
+        (...) mean, and half the width of its 68 % interval by Student's t; NaN for a single value
 
     Examples
     --------
@@ -156,8 +153,9 @@ def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
 def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estimate:
     """Propagate the error of a curve (P,) to a number `of(curve)`, such as the time of a crossing.
 
-    The error is half the difference between the numbers for the curve plus and minus its error.
-    Mean and error are NaN if the curve has no error, or if one of these numbers is NaN.
+    The error is half the difference between the numbers obtained from the curve plus its error and
+    from the curve minus its error. Mean and error are NaN if one of these numbers is, or if the
+    curve has no error.
     """
     first, last = (of(curve.mean + sign * curve.error) for sign in (-1, 1))
     error = abs(last - first) / 2
@@ -165,9 +163,10 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
 
 
 def jackknife(whole: float, rests: np.ndarray) -> Estimate:
-    """Return the jackknife estimate of a number, given its values `rests` (G,) without each block.
+    """Return the jackknife estimate of a quantity whose values without one block are `rests` (G,).
 
-    All G blocks, such as runs, contain equal parts of the sample; `whole` is the value for all.
+    `whole` is its value for all data. Each of the G blocks, such as runs, must hold the same share
+    of the data.
     """
     return estimate(len(rests) * whole - (len(rests) - 1) * np.asarray(rests))
 
@@ -176,10 +175,10 @@ class PseudoValues(NamedTuple):
     """Pseudo-values (G, ...) of the jackknife for G blocks of time of any length."""
 
     values: np.ndarray
-    share: np.ndarray  # fraction of the sample that is in the block
+    share: np.ndarray  # fraction of the sample contained in each block
 
     def mean(self) -> np.ndarray:
-        """Return the mean of the pseudo-values, or NaN if fewer than two blocks contain data."""
+        """Return the mean of the pseudo-values, or NaN unless at least two blocks contain data."""
         seen = self.share > 0
         mean = np.sum(self.share * np.where(seen, self.values, 0), axis=0)
         return np.where(seen.sum(axis=0) > 1, mean, np.nan)
@@ -187,7 +186,7 @@ class PseudoValues(NamedTuple):
     def rests(self) -> np.ndarray:
         """Return weighted deviations (G, ...) of the pseudo-values from their mean.
 
-        The squared error of the mean is the sum of their squares.
+        The sum of their squares is the squared error of the mean.
         """
         seen = self.share > 0
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -197,8 +196,8 @@ class PseudoValues(NamedTuple):
     def estimate(self, correlation: np.ndarray | float = 0.0) -> Estimate:
         """Return the mean of the pseudo-values with its error.
 
-        `correlation` is the correlation of neighbouring blocks of time: twice the sum of d_k
-        d_(k+1) divided by the sum of d_k^2, where d_k is the deviation of block k from the mean.
+        `correlation` describes neighbouring blocks of time: twice the sum of d_k d_(k+1) over the
+        sum of d_k^2, where d_k is the deviation of block k from the mean.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             error = np.sqrt(np.sum(self.rests() ** 2, axis=0))
@@ -219,9 +218,10 @@ def jackknife_of_sums(
 
 
 def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None) -> Estimate:
-    """Estimate the density (B,) of a sample (n,) in bins with the edges (B + 1,).
+    """Estimate the probability density (B,) of a sample (n,) in bins with the edges (B + 1,).
 
-    The error is that of `independent` values [n]; the integral is the fraction inside the bins.
+    The integral over all bins is the fraction of the sample inside them. Errors are those of
+    `independent` values [n].
     """
     share = np.histogram(values, bins)[0] / len(values)
     error = np.sqrt(share * (1 - share) / (independent or len(values)))
@@ -239,7 +239,7 @@ def excess_kurtosis(speed: np.ndarray) -> float:
     Returns
     -------
     float
-        0 for Maxwell's distribution, -1/2 for equal speeds
+        a2: 0 for the Maxwell distribution, -1/2 for equal speeds
 
     Examples
     --------
@@ -251,17 +251,18 @@ def excess_kurtosis(speed: np.ndarray) -> float:
 
 
 def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
-    """Format a mean with the digits that its error justifies.
+    """Format a mean with as many digits as its error justifies.
 
     Parameters
     ----------
     mean, error : float
-        the mean and its error
+        mean and its error
 
     Returns
     -------
     tuple of str
-        both, rounded to two significant digits of the error; the mean alone if the error is NaN
+        mean and error, rounded to two significant digits of the error; only the mean if the error
+        is NaN
 
     Examples
     --------
@@ -277,10 +278,10 @@ def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
 
 
 def kurtosis_noise(count: int) -> float:
-    """Return the standard deviation of a2, from `excess_kurtosis`, of Maxwellian speeds.
+    """Return the standard deviation of a2 (see `excess_kurtosis`) for Maxwellian speeds.
 
-    With x = v^2 distributed exponentially with mean 1, a2 is to first order the sample mean of x^2
-    / 2 - 2 x minus its expectation; the variance of a single term is 20 / 4 + 4 * 1 - 2 * 4 = 1.
+    x = v^2 is distributed exponentially; let its mean be 1. To first order a2 is the sample mean of
+    x^2 / 2 - 2 x minus its expectation, and one term has the variance 20 / 4 + 4 * 1 - 2 * 4 = 1.
     """
     return 1 / np.sqrt(count)
 
@@ -288,16 +289,16 @@ def kurtosis_noise(count: int) -> float:
 def fit_power_law(
     x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None, runs: ArrayLike = MANY
 ) -> PowerLaw | None:
-    """Fit a power law as a straight line of ln y against ln x; `fit_law` explains the errors.
+    """Fit a power law as a straight line of ln y against ln x; for its errors see `fit_law`.
 
     Parameters
     ----------
     x, y : numpy.ndarray
-        (P,) points; those with a coordinate that is not positive are left out
+        (P,) points; points with a coordinate that is not positive are ignored
     y_error : numpy.ndarray, optional
         (P,) errors of y [estimated from the scatter of the points]
     runs : array_like, optional
-        number of runs behind each error, a number or (P,) [the errors are exact]
+        number of runs from which each error was estimated, a number or (P,) [exact errors]
 
     Returns
     -------
@@ -336,27 +337,27 @@ def fit_law(
 
     If the points deviate from the law by more than their errors explain, the errors of the
     parameters are multiplied by sqrt(chi^2 per degree of freedom). All errors include Student's
-    factor. The page docs/explanation/statistics.md explains why the weights are equal.
+    factor t. docs/explanation/statistics.md explains why the weights are equal.
 
     Parameters
     ----------
     logarithm : callable
         function of x and the two parameters that returns ln y
     x, y : array_like
-        (P,) points; those with a coordinate that is not positive are left out
+        (P,) points; points with a coordinate that is not positive are ignored
     start : sequence of float
-        (2,) initial values of the parameters
+        (2,) initial guess of the parameters
     y_error : array_like, optional
         (P,) errors of y [estimated from the scatter of the points]
     runs : array_like, optional
-        number of runs behind each error, a number or (P,) [the errors are exact]
+        number of runs from which each error was estimated, a number or (P,) [exact errors]
     bounds : tuple, optional
-        smallest and largest values of the parameters
+        lower and upper bounds of the parameters
 
     Returns
     -------
     LawFit or None
-        the parameters, or None for fewer than three different x
+        fitted parameters, or None for fewer than three different x
 
     Examples
     --------
@@ -382,7 +383,7 @@ def fit_law(
 def usable(
     x: ArrayLike, y: ArrayLike, error: ArrayLike | None, runs: ArrayLike
 ) -> tuple[np.ndarray, ...]:
-    """Return x, y, error and number of runs of the points whose first three are positive."""
+    """Return x, y, error and number of runs of the points where the first three are positive."""
     x, y, error = (np.asarray(part, dtype=float) for part in (x, y, error))
     good = (x > 0) & (y > 0) & (error > 0)
     return x[good], y[good], error[good], np.broadcast_to(np.asarray(runs, float), x.shape)[good]
@@ -416,10 +417,10 @@ def with_errors(
 
 
 def points_miss_a_law(chi2: float, free: int, runs: float) -> bool:
-    """Return whether a chi^2 per degree of freedom this large has a probability below 0.5 %.
+    """Return whether chi^2 per degree of freedom is too large for chance (probability below 0.5 %).
 
-    `chi2` is calculated with errors that include Student's factor, each estimated from a number of
-    `runs` (Welch, Biometrika 38, 330 (1951)); `free` is the number of degrees of freedom.
+    `chi2` is based on errors that include Student's factor, each estimated from `runs` runs (Welch,
+    Biometrika 38, 330 (1951)); `free` is the number of degrees of freedom.
     """
     if free < 1 or runs < FEWEST_RUNS:
         return False

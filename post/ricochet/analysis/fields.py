@@ -1,8 +1,8 @@
-"""Fields of runs in a steady state on a grid of cells, and profiles between two walls.
+"""Fields on a grid of cells in a steady state, and profiles between two walls.
 
-The help of post/fields.py defines the fields. Errors and the correction of the bias of kT are those
-of the jackknife over blocks of time (docs/explanation/statistics.md). In shapes of arrays, C is the
-number of cells and G the number of blocks.
+The help of post/fields.py defines the fields. Errors, and the correction for the bias of kT, are
+obtained with the jackknife over blocks of time (docs/explanation/statistics.md). In the shapes of
+arrays, C is the number of cells and G the number of blocks.
 """
 
 from itertools import pairwise
@@ -28,29 +28,30 @@ __all__ = [
     "prediction",
 ]
 
-MOST_BLOCKS = 16  # largest number of blocks of a run
-FEWEST_BLOCKS = 3  # smallest number of blocks, over all runs, that is required for an error
-FEWEST_DISKS = 3  # fewest disks in a cell, leaving out any one block, for kT, stress and heat
-OSCILLATION = 0.05  # share of the centre of mass in kT above which it is not thermal motion
-FLOW_LEAST = -0.5  # smallest correlation of neighbouring blocks of the flow
-LONG = 1.5  # length of a block in units of the statistical inefficiency
-POINTS = 1 << 16  # used with obstacles to find the accessible area
+MOST_BLOCKS = 16  # largest number of blocks per run
+FEWEST_BLOCKS = 3  # fewest blocks, in all runs together, from which an error is estimated
+# A cell must contain this many disks, with any one block left out, for kT, stress and heat flux.
+FEWEST_DISKS = 3
+OSCILLATION = 0.05  # fraction of kT due to the centre of mass above which this is no thermal motion
+FLOW_LEAST = -0.5  # lower bound of the correlation of the flow in neighbouring blocks
+LONG = 1.5  # length of a block over the statistical inefficiency
+POINTS = 1 << 16  # test points for the area that obstacles leave accessible
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides perpendicular to each axis
-#: Properties (traits of `nature`) of runs between two walls to which Enskog's theory applies.
+#: Traits of `nature` with which Enskog's theory applies between two walls.
 LAWFUL = {"walls", "thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 Cells = tuple[int, int]
 
 
 class Fluxes(NamedTuple):
-    """Fluxes of momentum and energy from one wall to the opposite one, per length and time."""
+    """Momentum and energy transferred from one wall to the other, per unit of length and time."""
 
-    pressure: Any  # momentum along the axis; a number or an `Estimate`
-    shear: Any  # momentum along the walls; a number or an `Estimate`
+    pressure: Any  # of momentum along the axis; a number or an `Estimate`
+    shear: Any  # of momentum along the walls; a number or an `Estimate`
     energy: Any
 
 
 class Block(NamedTuple):
-    """Block of time, which is a part of the steady state of a run."""
+    """Block of time within the steady state of a run."""
 
     run: Run
     frames: list[int]
@@ -66,9 +67,9 @@ class Block(NamedTuple):
 
 
 def steady_frames(run: Run, skip: float | None) -> list[int]:
-    """Return the frames after `skip` collisions per disk, by default the second half of the run."""
+    """Return the frames after `skip` collisions per disk, or the second half of the run."""
     moves_away = any(one.get("motion") in {"piston", "constant_velocity"} for one in run.sides)
-    # a motion that begins during the run needs the second half
+    # a side that starts to move during the run requires the second half
     if moves_away or run.piston_positions:
         why = "has a side that moves away from its position (motion); fields require fixed cells"
         raise Refused(f"{run.path}: {why}")
@@ -81,10 +82,7 @@ def steady_frames(run: Run, skip: float | None) -> list[int]:
 
 
 def own_motion(run: Run, frames: list[int]) -> np.ndarray:
-    """Return velocities (F, N, 2) relative to the shear flow.
-
-    They are also relative to the centre of mass if noise moves it.
-    """
+    """Return velocities (F, N, 2) without shear flow and the noise-driven centre of mass."""
     v = run.velocity[frames]
     if run.shear_rate:
         height = run.position[frames][..., 1] - run.lower[1]
@@ -95,9 +93,9 @@ def own_motion(run: Run, frames: list[int]) -> np.ndarray:
 
 
 def oscillation_notes(runs: list[Run], skip: float | None, species: str | None) -> list[str]:
-    """Return a note for each run whose oscillating flow increases the measured temperatures.
+    """Return a note for each run in which an oscillating flow raises the measured temperature.
 
-    The centre of mass of N independent disks has 1/N of their kinetic energy; more belongs to a
+    The centre of mass of N independent disks has 1/N of their kinetic energy; any more is due to a
     flow.
     """
     notes = []
@@ -120,8 +118,8 @@ def oscillation_notes(runs: list[Run], skip: float | None, species: str | None) 
 def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
     """Return the largest statistical inefficiency of slowly varying quantities, in frames.
 
-    These are the totals of mass, momentum and energy, and the Fourier components of their densities
-    with the longest wavelength along each axis that is divided into cells.
+    These quantities are the total mass, momentum and energy, and the Fourier components of their
+    densities with the longest wavelength along each axis that is divided into cells.
     """
     place, v = (run.position[frames] - run.lower) / run.edges, own_motion(run, frames)
     waves, found = [np.ones(place.shape[:2])], 1.0
@@ -132,16 +130,16 @@ def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
         for amount in (1.0, v[..., 0], v[..., 1], np.sum(v**2, axis=-1)):
             parts = run.mass * amount * wave
             series = parts.sum(axis=1)
-            if np.ptp(series) > 1e-9 * np.mean(np.abs(parts).sum(axis=1)):  # else conserved
+            if np.ptp(series) > 1e-9 * np.mean(np.abs(parts).sum(axis=1)):  # otherwise conserved
                 found = max(found, statistical_inefficiency(series))
     return found
 
 
 def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[Block], float]:
-    """Return the blocks of time of all runs, and an upper bound of their correlation.
+    """Return the blocks of time of all runs, and an upper bound of the correlation of neighbours.
 
-    The bound is the correlation of neighbouring blocks for an exponential autocorrelation function,
-    or NaN if there are too few blocks for an error.
+    The bound assumes an exponential autocorrelation function. It is NaN if there are too few blocks
+    to estimate errors.
     """
     refuse_others(runs)
     steady = [steady_frames(run, skip) for run in runs]
@@ -163,17 +161,17 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
 def block_correlation(
     members: PseudoValues, blocks: list[Block], most: float, least: np.ndarray
 ) -> np.ndarray:
-    """Return, for each of F fields (G, F, C), the correlation (F,) of neighbouring blocks of time.
+    """Return the correlation (F,) of neighbouring blocks of time for F fields (G, F, C).
 
-    This is twice the sum of products of deviations of neighbouring blocks over the sum of squared
-    deviations, summed over all cells of a field because a single cell has too few blocks. It is
-    limited to the range from `least` (F,) to `most`.
+    It is twice the sum of products of the deviations of neighbouring blocks, divided by the sum of
+    squared deviations. Both sums include all cells of a field, because a single cell has too few
+    blocks. The result is limited to the range from `least` (F,) to `most`.
     """
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
     rest = np.nan_to_num(members.rests())
     square = np.maximum(np.sum(rest**2, axis=(0, 2)), np.finfo(float).tiny)
     product = np.sum((rest[1:] * rest[:-1])[same], axis=(0, 2)) / square
-    unbiased = product * (size - 1) / size + sum(same) / size**2  # about their own mean
+    unbiased = product * (size - 1) / size + sum(same) / size**2  # relative to their own mean
     return np.clip(2 * unbiased, least, most) + 0 * most
 
 
@@ -181,7 +179,7 @@ def block_correlation(
 
 
 def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return, for each cell along an axis, both ends of the range accessible to disk centres."""
+    """Return both ends of the range that disk centres can reach in each cell along an axis."""
     gap = 0 if run.periodic[axis] else radius
     sides = np.linspace(0, run.edges[axis], cells[axis] + 1)
     sides = run.lower[axis] + sides.clip(gap, run.edges[axis] - gap)
@@ -189,7 +187,7 @@ def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray,
 
 
 def places(run: Run, cells: Cells) -> np.ndarray:
-    """Return the midpoint of the part of each cell that is accessible to the centres of disks.
+    """Return the midpoint of the part of each cell that disk centres can reach.
 
     Parameters
     ----------
@@ -201,7 +199,7 @@ def places(run: Run, cells: Cells) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        (C, 2) midpoints [length]; x varies fastest
+        (C, 2) midpoints [length], with x varying fastest
 
     Examples
     --------
@@ -213,9 +211,9 @@ def places(run: Run, cells: Cells) -> np.ndarray:
 
 
 def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
-    """Return the area (C,) of each cell accessible to centres of disks with the given radius.
+    """Return the area (C,) of each cell that the centres of disks with a given radius can reach.
 
-    Beside obstacles its error is at most 0.5 % of the area of a cell.
+    Near obstacles its error is at most 0.5 % of the area of a cell.
     """
     spans, inner = [], []
     step = np.sqrt(run.edges.prod() / POINTS)
@@ -249,10 +247,10 @@ def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
 
 
 def sums(block: Block, cells: Cells, areas: list[np.ndarray], own: np.ndarray) -> np.ndarray:
-    """Return 12 sums for each cell (12, C) over the frames of a block, for the disks `own` (N,).
+    """Return 12 sums for each cell (12, C) over the frames of a block and the disks `own` (N,).
 
     They are the number of frames, the number of disks, disks per area, and the sums of m, m v, m v
-    v (xx, xy, yy), m v^2 v / 2 and I omega^2, with v of `own_motion`.
+    v (xx, xy, yy), m v^2 v / 2 and I omega^2, with v from `own_motion`.
     """
     run, frames, _ = block
     place = run.position[frames][:, own].reshape(-1, 2) - run.lower
@@ -261,7 +259,7 @@ def sums(block: Block, cells: Cells, areas: list[np.ndarray], own: np.ndarray) -
     x, y = own_motion(run, frames)[:, own].reshape(-1, 2).T
     square = mass * (x**2 + y**2) / 2
     area = np.array(areas)[np.tile(run.species[own] - 1, len(frames)), cell]
-    dense = 1 / np.where(area > 0, area, run.edges.prod() / np.prod(cells))  # beyond a moving side
+    dense = 1 / np.where(area > 0, area, run.edges.prod() / np.prod(cells))  # outside a moving side
     carried = [mass * x, mass * y, mass * x * x, mass * x * y, mass * y * y, square * x, square * y]
     turning = 0 * mass
     if "angular_velocity" in run.disk_data:
@@ -275,8 +273,8 @@ NAMES = (
     *("density", "flow_x", "flow_y", "temperature", "kT_x", "kT_y", "rotational_temperature"),
     *("stress_xx", "stress_xy", "stress_yy", "heat_x", "heat_y"),
 )
-#: Smallest correlation of neighbouring blocks. The flow is the rate of change of a bounded
-#: displacement, so its neighbouring blocks can be anticorrelated.
+#: Lower bounds of the correlation of neighbouring blocks. The flow is the time derivative of a
+#: bounded displacement, which makes neighbouring blocks anticorrelated.
 LEAST = np.array([FLOW_LEAST if name.startswith("flow") else 0.0 for name in NAMES])
 BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in NAMES])
 
@@ -284,9 +282,9 @@ BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in
 def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
     """Return the fields (12, C) calculated from `sums`; NaN in cells without disks.
 
-    kT, stress and heat flux are NaN in cells with fewer than `FEWEST_DISKS` disks. The variation g
-    h of a flow with the gradient g across a cell of width h contributes m (g h)^2 / 12 per disk to
-    the sum of m v v, which is subtracted.
+    kT, stress and heat flux are NaN in cells with fewer than `FEWEST_DISKS` disks. A flow with the
+    gradient g varies by g h across a cell of width h, which adds m (g h)^2 / 12 per disk to the sum
+    of m v v. This contribution is subtracted.
     """
     frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
     u, v, density = mx / mass, my / mass, dense / frames
@@ -313,36 +311,36 @@ def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
 class Fields(NamedTuple):
     """Fields measured in cells, averaged over runs of one input."""
 
-    found: dict[str, Estimate]  # (C,) by name
+    found: dict[str, Estimate]  # (C,) by name of the field
     values: dict[str, np.ndarray]  # (G, C) pseudo-values of the blocks
-    disks: np.ndarray  # (C,) number counted in each cell
+    disks: np.ndarray  # (C,) disks counted in each cell
     blocks: list[Block]
-    correlation: dict[str, float]  # of neighbouring blocks, by field; NaN without errors
+    correlation: dict[str, float]  # of neighbouring blocks, by name; NaN without errors
 
 
 def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | None = None) -> Fields:
-    """Measure density, flow, temperature, stress and heat flux in cells in the steady state.
+    """Measure density, flow velocity, temperature, stress and heat flux in a steady state.
 
     Parameters
     ----------
     runs : list of Run
-        (R,) runs of one input, which differ by their seed
+        (R,) runs of one input that differ only in their seed
     skip : float, optional
-        collisions per disk that are left out [the first half of each run]
+        collisions per disk discarded as equilibration [the first half of each run]
     cells : tuple of int
         numbers of cells along x and y
     species : str, optional
-        species to measure, with kT relative to its own flow [all disks]
+        species to measure, with kT relative to its own flow velocity [all disks]
 
     Returns
     -------
     Fields
-        fields with errors, NaN in cells that contain disks in fewer than two blocks of time
+        fields with errors; NaN in cells that contain disks in fewer than two blocks of time
 
     Raises
     ------
     RunError
-        if a run has too few frames, or a side moves away from its initial position
+        if a run has too few frames, or if a side moves away from its initial position
 
     Examples
     --------
@@ -357,8 +355,8 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     parts = np.stack([sums(block, cells, areas, own) for block in blocks])
     weights = parts[:, np.where(BY_FRAMES, 0, 1)]
     values, share = jackknife_of_sums(lambda total: of_sums(total, run, cells), parts, weights)
-    # If the total momentum is conserved, the thermal energy of N disks is smaller than N kT
-    # (docs/explanation/laws.md), so the temperature is multiplied by the ratio of N to the
+    # If the total momentum is conserved, the thermal energy of N disks is less than N kT
+    # (docs/explanation/laws.md). The temperature is therefore multiplied by the ratio of N to the
     # effective number of disks.
     values[:, NAMES.index("temperature")] *= run.n_disks / free_disks(run)
     for axis, name in enumerate(("kT_x", "kT_y")):
@@ -368,7 +366,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells, species: str | Non
     mean, error = members.estimate(near[:, None])
     frames, disks = parts[:, :2].sum(axis=0)
     room = np.max(areas, axis=0)
-    unseen = (disks == 0) & (room > 0)  # an error requires at least two blocks
+    unseen = (disks == 0) & (room > 0)  # an error requires disks in at least two blocks
     error[0, unseen] += 1 / (frames * room)[unseen]
     turns = "angular_velocity" in run.disk_data
     names = {n: k for k, n in enumerate(NAMES) if turns or n != "rotational_temperature"}
@@ -394,7 +392,7 @@ def gained(block: Block, name: str) -> np.ndarray:
 
 
 def fluxes(blocks: list[Block], axis: int) -> PseudoValues:
-    """Return the fluxes (G, 3) calculated from the momentum and energy passed to both walls."""
+    """Return the fluxes (G, 3) from the momentum and energy transferred to both walls."""
     run, (near, far) = blocks[0].run, ACROSS[axis]
     length = 2 * run.edges[1 - axis]
     parts = []
@@ -411,11 +409,11 @@ def fluxes(blocks: list[Block], axis: int) -> PseudoValues:
 def expected(
     run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[float, float]
 ) -> np.ndarray:
-    """Predict flow velocity, kT and density at x, (P, 3), given the first two at mid-channel.
+    """Predict flow velocity, kT and density at x, given the first two at mid-channel; shape (P, 3).
 
-    The pressure is uniform, and dT/dx = -(energy - shear u) / conductivity and du/dx = -shear /
-    viscosity are integrated with the fluxes `energy` and `shear`. ValueError is raised if the
-    temperature would become negative or the density exceed close packing.
+    At uniform pressure, the equations du/dx = -shear / viscosity and dT/dx = -(energy - shear u) /
+    conductivity are integrated with the given fluxes. ValueError is raised if the temperature
+    becomes negative or the density exceeds close packing.
     """
     diameter, mass = 2 * run.radius[0], run.mass[0]
     per_disk = np.pi * diameter**2 / 4
@@ -449,10 +447,9 @@ def expected(
 
 
 def has_theory(runs: list[Run], axis: int) -> bool:
-    """Return whether Enskog's theory applies to the gas between two opposite walls.
+    """Return whether Enskog's theory applies to the gas between the walls perpendicular to an axis.
 
-    The walls, perpendicular to the axis 0 (x) or 1 (y), must be the only ones, and the disks
-    smooth, elastic and of one species.
+    There must be no other walls, and the disks must be smooth, elastic and of one species.
     """
     return all(
         not run.periodic[axis] and run.periodic[1 - axis] and run.nature <= LAWFUL for run in runs
@@ -462,7 +459,7 @@ def has_theory(runs: list[Run], axis: int) -> bool:
 def prediction(
     measured: Fields, axis: int, x: np.ndarray
 ) -> tuple[dict[str, Estimate] | None, Fluxes]:
-    """Predict profiles between two walls from the measured fluxes with Enskog's theory.
+    """Predict the profiles between two walls with Enskog's theory, given the measured fluxes.
 
     Parameters
     ----------
@@ -476,14 +473,14 @@ def prediction(
     Returns
     -------
     profiles : dict of str to Estimate or None
-        (P,) "flow", "temperature" and "density"; None if no gas can have the measured fluxes
+        (P,) "flow", "temperature" and "density"; None if no gas can carry the measured fluxes
     fluxes : ricochet.fields.Fluxes
         pressure, shear stress and heat flux at the walls
 
     Raises
     ------
     RunError
-        if too few disks are in the middle between the walls
+        if too few disks are midway between the walls
 
     Examples
     --------

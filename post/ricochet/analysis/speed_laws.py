@@ -1,9 +1,10 @@
-"""Tests of the speeds of disks against the expected distribution.
+"""Tests of the speed distribution.
 
-The speeds of each frame are scaled by its energy and, where momentum is conserved, taken relative
-to the centre of mass. The p-values follow from random frames of equally many disks on the sphere of
-constant energy, which are scaled in the same way. Correlations between frames are included by a
-statistical inefficiency. See "p-values of speeds" in docs/explanation/statistics.md.
+The speeds in each frame are scaled by the energy of the frame and, where momentum is conserved,
+measured relative to the centre of mass. Random frames, in which the same number of disks is
+distributed uniformly on the energy sphere and scaled in the same way, yield the p-values. A
+statistical inefficiency accounts for correlations between frames. See "p-values of speeds" in
+docs/explanation/statistics.md.
 """
 
 from collections.abc import Sequence
@@ -22,31 +23,31 @@ __all__ = ["SpeedTest", "speed_test"]
 
 BINS = 30  # of equal probability
 DRAWN = 4000  # number of random samples
-# speeds of a random sample; with more, the scaled statistics have the same distribution
+# Number of speeds in a random sample; in larger samples the scaled statistics are distributed
+# alike.
 MOST = 1000
-MANY = 2000  # number of disks above which the motion of the centre of mass is negligible
+MANY = 2000  # disks above which the motion of the centre of mass is negligible
 NOISES = 400  # random estimates of a statistical inefficiency
-LONG = 200  # number of frames above which the noise of such an estimate is negligible
-LEAST = 0.5  # smallest statistical inefficiency of frames, whose correlations are positive
-TAIL = 0.05  # fraction of the random statistics that an exponential tail replaces
+LONG = 200  # frames above which the noise of such an estimate is negligible
+LEAST = 0.5  # least statistical inefficiency of frames, whose correlations are positive
+TAIL = 0.05  # fraction of the random statistics replaced by an exponential tail
 
 
 class SpeedTest(NamedTuple):
-    """Result of a test that compares speeds with the expected distribution."""
+    """Result of comparing measured speeds with the expected distribution."""
 
-    law: str  # "fixed_energy" (N disks share a fixed energy), or "Maxwell"
+    law: str  # "Maxwell", or "fixed_energy" if N disks share a fixed energy
     independent: float  # number of independent speeds
     ks: float  # Kolmogorov-Smirnov distance
-    ks_p: float  # probability of a larger distance by chance
-    chi2: float  # per degree of freedom, bins of equal probability
+    ks_p: float  # probability that chance alone causes a larger distance
+    chi2: float  # per degree of freedom, for bins of equal probability
     chi2_p: float
 
 
 def shares(run: Run, frames: Index, name: str) -> np.ndarray:
-    """Return the energies of the disks of a species, divided by the mean energy; shape (F, n).
+    """Return the energies of the disks of a species over the mean energy of their frame, (F, n).
 
-    In each frame the mean is taken over all disks if the run is in equilibrium, and otherwise over
-    the disks of the species.
+    The mean is that of all disks if the run is in equilibrium, otherwise that of the species.
     """
     energy, own = thermal_energy(run, frames), run.of_species(name)
     unit = energy if run.nature.in_equilibrium else energy[:, own]
@@ -54,22 +55,22 @@ def shares(run: Run, frames: Index, name: str) -> np.ndarray:
 
 
 class Sample(NamedTuple):
-    """Size of a sample of speeds, and the conservation laws that restrict its speeds."""
+    """Size of a sample of speeds, and the conservation laws that constrain the speeds."""
 
-    sharing: int  # disks that share the energy
-    own: int  # disks of the species
+    sharing: int  # number of disks that share the energy
+    own: int  # number of disks of the species
     frames: int
     axes: tuple[bool, ...] = (False, False)  # axes along which the centre of mass is at rest
     mass: tuple[
         float, ...
-    ] = ()  # masses of all disks, those of the species first; () if masses do not matter
+    ] = ()  # masses of all disks, with those of the species first; () if masses do not matter
 
     def law(self) -> Law:
-        """Return the expected distribution function of the reduced speed u of a sample."""
+        """Return the expected distribution function of the reduced speed u."""
         return finite_n_cdf(self.sharing, all(self.axes) and self.own == self.sharing)
 
     def smaller(self) -> "Sample":
-        """Return a smaller sample, of about `MOST` speeds, that yields equal p-values."""
+        """Return a smaller sample, of about `MOST` speeds, that yields the same p-values."""
         most = self
         if self.sharing > MANY or not any(self.axes):
             own = min(self.own, MANY)
@@ -77,7 +78,7 @@ class Sample(NamedTuple):
         return most._replace(frames=min(self.frames, -(-MOST // most.own)))
 
     def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Return `count` random samples (count, frames * own) of energies, in units of the mean."""
+        """Return `count` random samples (count, frames * own) of energies over their mean."""
         size = count * self.frames
         if self.mass:
             mass = np.array(self.mass)
@@ -94,7 +95,7 @@ class Sample(NamedTuple):
 
 
 def sample_of(run: Run, name: str, frames: int) -> Sample:
-    """Return a `Sample` that describes the disks of a species in a given number of frames."""
+    """Return the `Sample` that describes the disks of a species in a given number of frames."""
     own, axes = run.of_species(name), tuple(map(bool, comoving(run) | bool(run.shear_rate)))
     count = int(own.sum())
     mass = (*run.mass[own], *run.mass[~own]) if any(axes) and run.n_disks <= MANY else ()
@@ -102,7 +103,7 @@ def sample_of(run: Run, name: str, frames: int) -> Sample:
 
 
 def statistics_of(values: np.ndarray) -> np.ndarray:
-    """Compare samples (S, n) with the uniform distribution; return n D^2 and chi^2 (2, S)."""
+    """Compare samples (S, n) with the uniform distribution; return n D^2 and chi^2 as (2, S)."""
     samples, n = values.shape
     ranks, ordered = np.arange(n) / n, np.sort(values, axis=1)
     distance = np.maximum(ordered - ranks, ranks + 1 / n - ordered).max(axis=1)
@@ -114,7 +115,7 @@ def statistics_of(values: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def by_chance(sample: Sample) -> np.ndarray:
-    """Return an array (2, DRAWN) with n D^2 and chi^2 of random samples."""
+    """Return n D^2 and chi^2 of random samples, an array of shape (2, DRAWN)."""
     rng, law, parts = np.random.default_rng(1), sample.law(), []
     for _ in range(10):
         parts.append(statistics_of(law(np.sqrt(sample.draw(rng, DRAWN // 10)))))
@@ -122,10 +123,10 @@ def by_chance(sample: Sample) -> np.ndarray:
 
 
 def chance(found: float, drawn: np.ndarray) -> float:
-    """Return the probability that a random statistic exceeds the measured statistic `found`.
+    """Return the probability that a random statistic exceeds the measured one, `found`.
 
-    This is the fraction of larger values in `drawn` (S,), sorted random statistics. Above their 95
-    % quantile, a fitted exponential distribution is used instead.
+    It is the fraction of larger values among the sorted random statistics `drawn` (S,). Above their
+    95 % quantile, a fitted exponential distribution replaces them.
     """
     first = int(len(drawn) * (1 - TAIL))
     if found <= drawn[first]:
@@ -135,11 +136,11 @@ def chance(found: float, drawn: np.ndarray) -> float:
 
 
 def inefficiency(counts: Sequence[np.ndarray], cumulative: bool) -> float:
-    """Return the statistical inefficiency of numbers of disks in bins, averaged over runs.
+    """Return the statistical inefficiency of the number of disks in bins, averaged over runs.
 
-    `counts` contains the numbers (F, B) of disks in B bins in F frames of each run, which are
-    summed over bins if `cumulative`, as in the Kolmogorov-Smirnov distance. A run with fewer than
-    three frames has the inefficiency 1.
+    `counts` holds, for each run, the numbers (F, B) of disks in B bins in F frames. If
+    `cumulative`, they are summed over the bins, as in the Kolmogorov-Smirnov distance. The
+    inefficiency of a run with fewer than three frames is taken to be 1.
     """
     series = [np.cumsum(own, axis=1)[:, :-1] if cumulative else own for own in counts]
     found = [statistical_inefficiency(own, LEAST) if len(own) > 2 else 1.0 for own in series]
@@ -148,10 +149,10 @@ def inefficiency(counts: Sequence[np.ndarray], cumulative: bool) -> float:
 
 @lru_cache(maxsize=64)
 def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
-    """Return random estimates (NOISES,) of a statistical inefficiency, divided by its true value.
+    """Return random estimates (NOISES,) of a statistical inefficiency over its true value.
 
-    They are made from random numbers of disks in bins, for runs with `sizes` frames, whose
-    autocorrelation decays exponentially. For 20 frames their relative noise is about a third.
+    Each is obtained from random numbers of disks in bins whose autocorrelation decays
+    exponentially, for runs of `sizes` frames. With 20 frames the relative noise is about one third.
     """
     if sum(sizes) > LONG:
         return np.ones(NOISES)
@@ -162,10 +163,10 @@ def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
 
 
 def correlated(values: np.ndarray, keep: float) -> np.ndarray:
-    """Convert independent values (F, ..., B) into an autoregressive series of F frames.
+    """Convert independent values (F, ..., B) to an autoregressive series of F frames.
 
-    Each frame is `keep` times the previous frame plus noise. The values of the B bins of a frame
-    are deviations of numbers of disks, and add up to zero.
+    Each frame is `keep` times the previous one plus noise. The values in the B bins of a frame are
+    deviations from the expected numbers of disks, and add up to zero.
     """
     values = values - values.mean(axis=-1, keepdims=True)
     for k in range(1, len(values)):
@@ -176,7 +177,7 @@ def correlated(values: np.ndarray, keep: float) -> np.ndarray:
 def p_value(
     found: float, drawn: np.ndarray, own: float, sizes: tuple[int, ...], cumulative: bool
 ) -> float:
-    """Return the probability that a random statistic exceeds the measured statistic `found`.
+    """Return the probability that a random statistic exceeds the measured one, `found`.
 
     `drawn` (DRAWN,) are statistics of random independent frames, `own` is the statistical
     inefficiency of the measured frames, and `sizes` are the numbers of frames of the runs in
@@ -193,7 +194,7 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
     Parameters
     ----------
     runs : list of Run
-        (R,) runs that differ by their seed
+        (R,) runs that differ only in their seed
     frames : list of Index
         (R,) frames of each run
     name : str
@@ -202,9 +203,9 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
     Returns
     -------
     SpeedTest
-        statistics and p-values of the Kolmogorov-Smirnov and chi-square tests; `law` is "none" and
-        they are NaN if the distribution is unknown: for disks that conserve their angular momentum
-        in a round container, and for fewer than three disks that share a fixed energy
+        statistics and p-values of the Kolmogorov-Smirnov and chi-square tests. If the distribution
+        is unknown, they are NaN and `law` is "none": for disks that conserve their angular momentum
+        in a round container, and for fewer than three disks sharing a fixed energy
 
     Examples
     --------

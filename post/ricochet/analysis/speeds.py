@@ -1,4 +1,4 @@
-"""Speeds of disks in units of the thermal speed, and moments of their distribution."""
+"""Speeds of disks relative to the thermal speed, and moments of their distribution."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,8 @@ def kt_of_frames(
     """Return kT (F,) in frames, relative to the shear flow and to the centre of mass.
 
     The motion of the centre of mass is subtracted along axes where momentum is conserved. `species`
-    selects disks, and `component` 0 or 1 the temperature kT_x or kT_y [their mean].
+    selects disks. The result is the mean of kT_x and kT_y, or only one of them if `component` is 0
+    or 1.
     """
     own = slice(None) if species is None else run.of_species(species)
     energy = thermal_energy(run, frames, component)[:, own].mean(axis=1)
@@ -46,7 +47,7 @@ def reduced_speeds(
     frames : ricochet.arrays.Index
         frames to use
     each : bool
-        whether kT is that of each frame, and not the mean over all frames
+        use the kT of each frame in place of the mean over all frames
     species : str, optional
         name of the species [all]
 
@@ -79,11 +80,11 @@ def reduced_speeds(
 
 
 def moment(members: Sequence[np.ndarray], power: int, independent: float) -> Estimate:
-    """Return the mean of u^power for speeds u that are first scaled to a mean square of 1.
+    """Return the mean of u^power, where the speeds u are first scaled to a mean square of 1.
 
-    `members` contains the speeds (F, n) of n disks in F frames of each run. The error is that of
-    the time series of frames, corrected for the scaling, or that of `independent` uncorrelated
-    speeds if a single run has too few frames.
+    `members` holds, for each run, the speeds (F, n) of n disks in F frames. The error is that of
+    the time series of frames, corrected for the scaling; if a single run has too few frames, it is
+    that of `independent` uncorrelated speeds.
     """
     u = np.concatenate([one.ravel() for one in members])
     mean = np.mean(u**power)
@@ -105,8 +106,8 @@ def relaxation(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return collisions per disk (F,) and the second Sonine coefficient a2 (F,) of early frames.
 
-    These are frames in which disks of all species move, with at most `until` collisions per disk
-    or, if given, the first `frames`.
+    Only frames in which disks of all species move are used, up to `until` collisions per disk or,
+    if given, the first `frames` of them.
     """
     tau = run.collisions_per_disk_at(run.time)
     if frames is None:
@@ -127,7 +128,7 @@ def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Esti
     Parameters
     ----------
     runs : list of Run
-        (R,) runs that differ by their seed
+        (R,) runs that differ only in their seed
     frames : list of Index
         (R,) frames of each run
     name : str
@@ -136,8 +137,8 @@ def means(runs: Sequence[Run], frames: Sequence[Index], name: str) -> tuple[Esti
     Returns
     -------
     tuple of Estimate
-        mean speed and mean energy, with errors from the autocorrelation of frames or, for few
-        frames or runs that differ significantly, from the scatter of the runs
+        mean speed and mean energy. The errors account for the autocorrelation of frames; for few
+        frames, or runs that differ significantly, they are estimated from the scatter of the runs
 
     Examples
     --------

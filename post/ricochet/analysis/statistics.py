@@ -1,7 +1,7 @@
 """Means of correlated time series, with errors and warnings; includes the module `estimates`.
 
-Independent values, such as the results of runs with different seeds, are averaged by `estimate`,
-the correlated samples of a single time series by `correlated_mean`.
+`estimate` averages independent values, such as the results of runs with different seeds;
+`correlated_mean` averages the correlated samples of one time series.
 """
 
 from collections.abc import Sequence
@@ -49,29 +49,30 @@ __all__ = [
 
 MOST_WINDOWS = 10**6
 FEW = 10  # independent samples
-FINE, COARSE = 64, 16  # number of parts of a series whose means resolve slow modes
-FEWEST = 8  # smallest number of independent samples for an error
-LEAST_WAVES, MOST_WAVES = 2, 8  # number of slow waves from which the error of a series is estimated
-PER_WAVE = 6  # largest number of waves times inefficiency over length
-LEAST_INEFFICIENCY = 0.02  # of a strongly anticorrelated series
+FINE, COARSE = 64, 16  # parts into which a series is divided to resolve its slow modes
+FEWEST = 8  # fewest independent samples from which an error is estimated
+# The error of a series is estimated from at least and at most this many slow waves.
+LEAST_WAVES, MOST_WAVES = 2, 8
+PER_WAVE = 6  # upper bound of the number of waves times inefficiency over length
+LEAST_INEFFICIENCY = 0.02  # lower bound, for a strongly anticorrelated series
 
 
 class SeriesMean(NamedTuple):
     """Mean of a correlated series, with its error and diagnostics."""
 
     mean: float
-    error: float  # half the 68 % interval, or NaN for fewer than `FEWEST` independent samples
-    samples: float  # number of independent samples
-    drift: float  # slope over its error: a standard Gaussian variable if there is no drift
+    error: float  # half the width of the 68 % interval; NaN below `FEWEST` independent samples
+    samples: float  # effective number of independent samples
+    drift: float  # slope over its error, a standard Gaussian variable if there is no drift
     freedom: float = np.inf  # degrees of freedom of the error
 
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
-        """Return the mean, with its error, after replacing each sample x by offset + factor x."""
+        """Return the mean and error of offset + factor x, where x are the samples."""
         return self._replace(mean=offset + factor * self.mean, error=abs(factor) * self.error)
 
 
 def cells(series: np.ndarray, count: int) -> np.ndarray:
-    """Return the means of about `count` equal parts of a series (T,), without its first rest."""
+    """Return the means of about `count` equal parts of a series (T,), less an excess in front."""
     width = max(1, len(series) // count)
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
 
@@ -79,9 +80,9 @@ def cells(series: np.ndarray, count: int) -> np.ndarray:
 def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     """Estimate the statistical inefficiency 1 + 2 tau of a series.
 
-    It is the factor by which correlations increase the variance of the mean; tau is the integrated
-    autocorrelation time in samples, truncated and corrected for the unknown mean as by Wolff,
-    Computer Physics Communications 156, 143 (2004), with S = 1.5.
+    Correlations increase the variance of the mean by this factor; tau is the integrated
+    autocorrelation time in samples. The sum is truncated, and corrected for the unknown mean, as in
+    Wolff, Computer Physics Communications 156, 143 (2004), with S = 1.5.
 
     Parameters
     ----------
@@ -94,7 +95,7 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     Returns
     -------
     float
-        the statistical inefficiency
+        statistical inefficiency
 
     Examples
     --------
@@ -108,7 +109,7 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
 
 
 def inefficiency_and_lag(series: np.ndarray, least: float) -> tuple[float, int]:
-    """Return the statistical inefficiency and the largest lag in the sum of autocorrelations."""
+    """Return the statistical inefficiency, and the lag at which its sum is truncated."""
     if np.max(np.ptp(series, axis=0)) <= 1e-12 * np.max(np.abs(series), initial=0):
         return 1.0, 0
     count, rest = len(series), series - np.mean(series, axis=0)
@@ -124,23 +125,23 @@ def inefficiency_and_lag(series: np.ndarray, least: float) -> tuple[float, int]:
 def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
     """Estimate the mean of a correlated series, or the ratio of the sums of two such series.
 
-    The error is estimated from the slowest Fourier components, as docs/explanation/statistics.md
-    describes. It covers fluctuations within the series, but not states that last as long as the
-    run, such as the structure of a glass; for these, use the scatter of several runs.
+    The error is estimated from the slowest Fourier components (docs/explanation/statistics.md). It
+    covers fluctuations within the series but not states that last as long as the run, such as the
+    structure of a glass. For these, use the scatter of several runs.
 
     Parameters
     ----------
     amount : array_like
-        samples of a series in equilibrium, such as numbers of collisions; shape (T,)
+        (T,) samples of a series in equilibrium, such as numbers of collisions
     per : array_like
-        series whose sum is the divisor, such as the durations in which the collisions were
-        counted; shape (T,), or a constant
+        (T,) series whose sum is the divisor, such as the times during which the collisions were
+        counted; or a constant
 
     Returns
     -------
     SeriesMean
-        sum of `amount` divided by the sum of `per`; the error is NaN if most of the sum of `per`
-        is due to a short part of the series
+        sum of `amount` over the sum of `per`; the error is NaN if a short part of the series
+        dominates the sum of `per`
 
     Examples
     --------
@@ -167,12 +168,12 @@ def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> Series
 def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     """Return standard error of the mean, degrees of freedom and drift of a series (T,).
 
-    The squared error is the mean square of the first coefficients of a cosine transform (Lazarus et
-    al., Journal of Business and Economic Statistics 36, 541 (2018)) whose period exceeds the
-    correlation length: the inefficiency plus its standard deviation (Madras and Sokal, Journal of
-    Statistical Physics 50, 109 (1988)). The drift is the first coefficient over the root mean
-    square of the following ones, which has Student's distribution, converted to a Gaussian
-    variable.
+    The squared error is the mean square of the lowest coefficients of a cosine transform (Lazarus
+    et al., Journal of Business and Economic Statistics 36, 541 (2018)), those with periods longer
+    than the correlation length: the inefficiency plus its standard deviation (Madras and Sokal,
+    Journal of Statistical Physics 50, 109 (1988)). The drift is the first coefficient over the root
+    mean square of the others. This ratio follows Student's distribution and is converted to a
+    standard Gaussian variable.
     """
     parts = cells(series, FINE)
     per_sample, lag = inefficiency_and_lag(parts, LEAST_INEFFICIENCY)
@@ -193,11 +194,11 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
     """Return standard error of the mean and degrees of freedom of an anticorrelated series (T,).
 
-    The running sum of such a series is bounded, as the momentum between two walls whose impulses
-    are added. To the power of a Fourier transform its ends contribute as much as to the variance of
-    the mean, to that of a cosine transform twice as much. The power rises as the square of the
-    frequency; fewer coefficients for a small inefficiency `per_sample` keep the relative bias
-    constant.
+    The running sum of such a series is bounded: an example is the momentum of a gas, to which two
+    walls add impulses. The ends of the running sum contribute to the power of a Fourier transform
+    as much as to the variance of the mean, but twice as much to that of a cosine transform. The
+    power rises as the square of the frequency. The smaller the inefficiency `per_sample`, the fewer
+    coefficients are used, so that the relative bias stays the same.
     """
     most = min(MOST_WAVES, len(parts) // 2) // 2
     pairs = int(np.clip(round(len(parts) * per_sample**0.5 / (2 * PER_WAVE)), 1, max(1, most)))
@@ -206,7 +207,7 @@ def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
 
 
 def equilibration(series: np.ndarray) -> int:
-    """Return the number of samples before a series becomes stationary.
+    """Return the number of samples to discard before a series is stationary.
 
     It is twice the number discarded by White's rule (MSER), which minimises the standard error of
     the mean of the remaining samples (White, Simulation 69, 323 (1997)).
@@ -237,8 +238,8 @@ def equilibration(series: np.ndarray) -> int:
 def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     """Average the means of independent runs.
 
-    The error is calculated from those of the runs. If the means scatter by more than these explain,
-    or if a run has no error, it is calculated from the scatter.
+    The error is propagated from the errors of the runs, or estimated from the scatter of the means
+    if a run has no error or if the means scatter by more than their errors explain.
 
     Parameters
     ----------
@@ -248,8 +249,8 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     Returns
     -------
     SeriesMean
-        the average; `samples` is the sum over the runs, or the number of runs for an error from
-        scatter
+        the average; `samples` is the sum over the runs or, for an error from the scatter, the
+        number of runs
 
     Examples
     --------
@@ -261,7 +262,7 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     runs = len(means)
     mean, _, samples, drift, own_freedom = np.array(means).T
     size, square = samples.sum(), squares(means)
-    scatter = np.sum(square**2 / own_freedom)  # degrees of freedom (Welch, Satterthwaite)
+    scatter = np.sum(square**2 / own_freedom)  # Welch and Satterthwaite
     freedom = np.sum(square) ** 2 / scatter if scatter > 0 else np.inf
     own = student(freedom + 1) * np.sqrt(np.sum(square)) / runs
     if scatter_p(means) < UNLIKELY or np.isnan(own):
@@ -276,7 +277,7 @@ def squares(means: Sequence[SeriesMean]) -> np.ndarray:
 
 
 def scatter_p(means: Sequence[SeriesMean]) -> float:
-    """Return the p-value of the hypothesis that the means differ only because of their errors."""
+    """Return the p-value of the hypothesis that means differ only because of their errors."""
     mean, error, _, _, freedom = np.array(means).T
     if len(means) < 2 or not np.all(error > 0):
         return 1.0
@@ -285,14 +286,14 @@ def scatter_p(means: Sequence[SeriesMean]) -> float:
 
 
 def has_drift(mean: SeriesMean) -> bool:
-    """Return whether a drift of at least this size has a probability below `UNLIKELY` by chance."""
+    """Return whether the drift is significant (probability by chance below `UNLIKELY`)."""
     return bool(2 * scipy.special.ndtr(-abs(mean.drift)) < UNLIKELY)
 
 
 def has_trend(series: np.ndarray) -> bool:
     """Return whether a straight line explains more than 75 % of the variance of a series (T,).
 
-    For such a series `correlated_mean` finds no drift: it takes the trend for a long
+    `correlated_mean` finds no drift in such a series: it mistakes the trend for a long
     autocorrelation.
     """
     if len(series) < FEWEST or np.ptp(series) <= 1e-9 * np.max(np.abs(series)):
@@ -301,7 +302,7 @@ def has_trend(series: np.ndarray) -> bool:
 
 
 def diagnostics(name: str, means: Sequence[SeriesMean]) -> list[str]:
-    """Return sentences on why the mean of the quantity `name` over runs may be unreliable."""
+    """Return sentences that say why the mean over runs of the quantity `name` may be unreliable."""
     found, whole = [], combine_runs(means)
     if np.isnan(whole.error):
         return [f"{name}: no error, a run has fewer than {FEWEST} samples in equilibrium"]
@@ -328,7 +329,7 @@ def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarr
     Parameters
     ----------
     time, value : numpy.ndarray
-        (T,) the series
+        (T,) times and values of the series
     width : float
         duration of a window [time]
 
@@ -340,7 +341,7 @@ def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarr
     Raises
     ------
     ValueError
-        if there would be more than a million windows
+        if there were more than a million windows
 
     Examples
     --------

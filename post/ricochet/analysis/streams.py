@@ -1,12 +1,13 @@
-"""Stream function of the mean flow of disks in a steady state.
+"""Stream function psi of the mean flow of disks in a steady state.
 
-The flux of disks j (disks per length and time) then has no divergence, so that j_x = d psi / dy and
-j_y = -d psi / dx. Contour lines of psi are streamlines, and its difference between two points is
-the number of disks that pass between them per unit of time.
+In a steady state the flux j of disks (disks per length and time) has no divergence, so that j_x = d
+psi / dy and j_y = -d psi / dx. Contour lines of psi are streamlines, and the difference of psi
+between two points is the number of disks that pass between them per unit of time.
 
-psi minimises the integral of (j - j_psi)^2 over the box, which depends on j only through sums over
-disks of v times the gradients of the basis functions. The flux is thus not averaged over cells, and
-psi does not depend on the requested cells as long as the finite elements are small.
+psi minimises the integral over the box of the squared difference between the measured flux and that
+of psi. This integral depends on the disks only through sums of their velocities times the gradients
+of basis functions, so that the flux need not be averaged over cells, and psi does not depend on the
+requested cells as long as the finite elements are small.
 """
 
 from typing import NamedTuple
@@ -28,21 +29,21 @@ from .fields import (
 
 __all__ = ["StreamFunction", "stream_function"]
 
-FINE = 64  # smallest number of finite elements along an axis
+FINE = 64  # fewest finite elements along an axis
 
 
 class StreamFunction(NamedTuple):
-    """Stream function at the corners and in the middles of C = NX NY cells [1/time]."""
+    """Stream function [1/time] at the corners and midpoints of C = NX NY cells."""
 
     corners: Estimate  # (NY + 1, NX + 1)
-    middles: Estimate  # (C,) at the points that `fields.places` returns
+    middles: Estimate  # (C,) at the points returned by `fields.places`
 
 
 class Mesh(NamedTuple):
-    """Grid of bilinear finite elements that cover the box of a run."""
+    """Grid of bilinear finite elements covering the box of a run."""
 
     run: Run
-    elements: tuple[int, int]  # numbers of elements along x and y
+    elements: tuple[int, int]  # along x and y
 
     @property
     def size(self) -> np.ndarray:
@@ -50,10 +51,10 @@ class Mesh(NamedTuple):
         return np.asarray(self.run.edges / self.elements)
 
     def corners_of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the elements that contain points (P, 2) as nodes and functions at their corners.
+        """Return the corners of the elements that contain points (P, 2), and their basis functions.
 
-        The first two arrays (4, P) contain the numbers of the corners and the values of their basis
-        functions at the points, the third (4, 2, P) the derivatives along x and y.
+        The results are the nodes at the four corners (4, P), the values of their basis functions at
+        the points (4, P), and the derivatives along x and y (4, 2, P).
         """
         place = (points - self.run.lower) / self.size
         cell = np.clip(place.astype(int), 0, np.array(self.elements) - 1)
@@ -75,8 +76,8 @@ class Mesh(NamedTuple):
     def loads(self, points: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the sums (nodes,) over disks of v_x d phi / dy - v_y d phi / dx.
 
-        The disks have the positions `points` (P, 2) and the velocities (P, 2); phi is the basis
-        function of a node.
+        The disks have the positions `points` (P, 2) and the given velocities (P, 2); phi is the
+        basis function of a node.
         """
         nodes, _, slopes = self.corners_of(points)
         parts = velocity[:, 0] * slopes[:, 1] - velocity[:, 1] * slopes[:, 0]
@@ -98,7 +99,7 @@ class Mesh(NamedTuple):
         return scipy.sparse.csr_array(whole)
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
-        """Return the stream functions (nodes, B) of B loads (nodes, B), which are 0 at node 0."""
+        """Return the stream functions (nodes, B) for B loads (nodes, B), with psi = 0 at node 0."""
         unknowns, nodes = node_unknowns(self.elements[1], self.elements[0], self.run.periodic)
         if not unknowns:
             return np.zeros(loads.shape)
@@ -110,14 +111,14 @@ class Mesh(NamedTuple):
 def stream_function(
     runs: list[Run], skip: float | None, cells: Cells, species: str | None = None
 ) -> StreamFunction:
-    """Measure the stream function of the flux of disks in the steady state.
+    """Measure the stream function of the flux of disks in a steady state.
 
     Parameters
     ----------
     runs : list of Run
-        (R,) runs of one input, which differ by their seed
+        (R,) runs of one input that differ only in their seed
     skip : float, optional
-        collisions per disk that are left out [the first half of each run]
+        collisions per disk discarded as equilibration [the first half of each run]
     cells : tuple of int
         numbers of cells along x and y
     species : str, optional
@@ -126,13 +127,13 @@ def stream_function(
     Returns
     -------
     StreamFunction
-        psi [1/time] at corners and middles of cells with jackknife errors, 0 at the lower left
-        corner and constant on each wall
+        psi [1/time] at the corners and midpoints of the cells, with jackknife errors; psi is 0 in
+        the lower left corner and constant on each wall
 
     Raises
     ------
     Refused
-        if a run recycles disks, whose flux has sources
+        if a run recycles disks, which adds sources to the flux
 
     Examples
     --------
@@ -175,7 +176,7 @@ def stream_function(
 
 
 def velocities(run: Run, frames: list[int]) -> np.ndarray:
-    """Return velocities (F, N, 2), relative to the centre of mass only if noise moves it."""
+    """Return velocities (F, N, 2), relative to the centre of mass only if noise accelerates it."""
     v = own_motion(run, frames)
     height = run.position[frames][..., 1] - run.lower[1] - run.edges[1] / 2
     v[..., 0] += run.shear_rate * height
@@ -185,11 +186,12 @@ def velocities(run: Run, frames: list[int]) -> np.ndarray:
 def node_unknowns(
     rows: int, columns: int, periodic: np.ndarray
 ) -> tuple[int, scipy.sparse.csr_array]:
-    """Return the number of unknowns, and the matrix that converts unknowns to psi at the nodes.
+    """Return the number of unknowns, and the matrix that maps them to psi at the nodes.
 
-    The unknowns are psi at nodes not on walls, shared by periodic images, and one flux for each
-    periodic axis: apart from its sign the difference of psi between the sides parallel to this
-    axis. Psi is constant on walls, and 0 on the lower and left wall or at the lower left corner.
+    The unknowns are psi at the nodes not on walls, shared by periodic images, and one flux for each
+    periodic axis: up to its sign, the difference of psi between the two sides parallel to this
+    axis. On walls psi is constant; it is 0 on the lower and the left wall, or in the lower left
+    corner.
     """
     y, x = np.meshgrid(np.arange(rows + 1), np.arange(columns + 1), indexing="ij")
     fixed = (x % columns == 0) & (y % rows == 0) if np.all(periodic) else np.zeros(x.shape, bool)
@@ -202,7 +204,7 @@ def node_unknowns(
     entries = [(np.flatnonzero(~fixed.ravel()), which, np.ones(len(which)))]
     unknowns = len(free)
     for axis, place, count in ((0, y, rows), (1, x, columns)):
-        if periodic[axis]:  # the flux along this axis
+        if periodic[axis]:  # flux along this axis
             every = np.arange(x.size)
             entries.append((every, np.full(x.size, unknowns), place.ravel() / count))
             unknowns += 1

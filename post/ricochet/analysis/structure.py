@@ -1,6 +1,7 @@
 """Structure of a run: pair correlation, structure factor, clusters and bond order.
 
-Libraries for structure analysis support periodic boxes but not walls; only SciPy is used.
+Libraries for structure analysis support periodic boxes but not walls. This module therefore uses
+only SciPy.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -25,18 +26,18 @@ __all__ = [
     "structure_factor",
 ]
 
-MOST_PAIRS = 2 * 10**5  # largest number of pairs in a frame, for `bond_correlation`
-MOST_TERMS = 3e8  # largest number of terms of S(k) in a frame
+MOST_PAIRS = 2 * 10**5  # largest number of pairs per frame in `bond_correlation`
+MOST_TERMS = 3e8  # largest number of terms of S(k) per frame
 
 
 def periods(run: Run) -> np.ndarray:
-    """Return the displacements (M, 2) of the periodic images of the box; one of them is 0."""
+    """Return the displacements (M, 2) of the periodic images of the box, including 0."""
     along = [(-1, 0, 1) if periodic else (0,) for periodic in run.periodic]
     return run.edges * np.array([(i, j) for i in along[0] for j in along[1]])
 
 
 def refuse(run: Run, *traits: str) -> None:
-    """Raise an error if the run has one of the given traits of `nature`."""
+    """Raise Refused if the run has a trait of `nature` other than the given ones."""
     law = "structure is found in boxes at rest" + ", S(k) in periodic ones" * ("walls" in traits)
     allow(run, law, *TRAITS.keys() - set(traits))
 
@@ -44,17 +45,17 @@ def refuse(run: Run, *traits: str) -> None:
 def pair_correlation(
     run: Run, frames: Index, edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
-    """Return the pair correlation function g(r) averaged over frames.
+    """Return the pair correlation function g(r), averaged over frames.
 
-    g(r) is the density at the distance r from a disk over the mean density of the box. Between
-    walls, which may move, distances are measured only from disks far from the walls.
+    g(r) is the density at distance r from a disk, relative to the mean density of the box. Between
+    walls, which may move, only disks far from the walls serve as centres.
 
     Parameters
     ----------
     run : ricochet.Run
         a run in a box at rest
     frames : ricochet.arrays.Index
-        a number, a slice or a list
+        an integer, a slice or a list
     edges : numpy.ndarray
         (B + 1,) edges of the bins of r, in mean diameters
     pair : tuple of str, optional
@@ -63,7 +64,7 @@ def pair_correlation(
     Returns
     -------
     numpy.ndarray
-        (B,) g(r), or NaN without pairs of disks
+        (B,) g(r), or NaN if there are no pairs of disks
 
     Raises
     ------
@@ -82,7 +83,7 @@ def pair_correlation(
     one, *others = masks(run, pair)
     other = others[0] if others else one
     sums = np.zeros(len(edges) - 1)
-    expected = 0.0  # pairs per area for randomly placed disks
+    expected = 0.0  # pairs per area if disks were placed at random
     for k in chosen(run.n_frames, frames):
         x, (lower, upper) = run.position[k], run.corners_at(run.time[k])
         margin = np.where(run.periodic, -np.inf, r[-1])
@@ -97,29 +98,29 @@ def pair_correlation(
 
 
 def masks(run: Run, pair: tuple[str, str] | None) -> list[np.ndarray]:
-    """Return a list with the masks (N,) of the species in `pair`, or with the mask of all disks."""
+    """Return the masks (N,) of the species in `pair`, or only that of all disks."""
     return [run.of_species(name) for name in dict.fromkeys(pair)] if pair else [run.species > 0]
 
 
 def structure_factor(
     run: Run, frames: Index, edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
-    """Return the structure factor ``S(k) = <|sum of exp(i k x)|^2> / N`` averaged over frames.
+    """Return the structure factor ``S(k) = <|sum of exp(i k x)|^2> / N``, averaged over frames.
 
-    One of k and -k is used, because S(k) = S(-k), and if there are many disks only some wave
-    vectors.
+    Since S(k) = S(-k), only one of k and -k is used. If there are many disks, the mean covers only
+    some of the wave vectors.
 
     Parameters
     ----------
     run : ricochet.Run
         a run in a periodic box
     frames : ricochet.arrays.Index
-        a number, a slice or a list
+        an integer, a slice or a list
     edges : numpy.ndarray
         (B + 1,) edges of the bins of k, in 1 / mean diameter
     pair : tuple of str, optional
-        two species, for the product of their sums over the geometric mean of their numbers [all
-        disks]
+        two species, for the product of their sums divided by the geometric mean of their numbers of
+        disks [all disks]
 
     Returns
     -------
@@ -138,7 +139,7 @@ def structure_factor(
     ((5,), True)
     """
     refuse(run, "sheared", "walls")
-    unit = 2 * np.pi / run.edges  # the wave vectors are its multiples
+    unit = 2 * np.pi / run.edges  # wave vectors are integer multiples
     most = np.floor(edges[-1] / (2 * run.radius.mean()) / unit).astype(int)
     step = int(np.ceil(np.sqrt(2 * run.n_disks * np.prod(most + 1) / MOST_TERMS)))
     number_x, number_y = most // step
@@ -152,7 +153,7 @@ def structure_factor(
         waves = [sums_of_waves(x[some], y[some], number_x, number_y) for some in both]
         sums += (waves[0] * waves[-1].conj()).real
     sums /= np.sqrt(both[0].sum() * both[-1].sum()) * len(numbers)
-    sums[(along_x[:, None] == 0) & (along_y <= 0)] = np.nan  # one of k and -k
+    sums[(along_x[:, None] == 0) & (along_y <= 0)] = np.nan  # only one of k and -k
     known = np.isfinite(sums)
     total, _ = np.histogram(k[known], edges, weights=sums[known])
     number, _ = np.histogram(k[known], edges)
@@ -160,9 +161,9 @@ def structure_factor(
 
 
 def sums_of_waves(x: np.ndarray, y: np.ndarray, most_x: int, most_y: int) -> np.ndarray:
-    """Return the sums of exp(i (m x + n y)) for m = 0 to `most_x` and n = -`most_y` to `most_y`."""
+    """Return sums of exp(i (m x + n y)) for m = 0 to `most_x` and n = -`most_y` to `most_y`."""
     parts = [
-        np.ascontiguousarray(part)  # of strided parts, matrix products would be slow
+        np.ascontiguousarray(part)  # matrix products of strided arrays would be slow
         for phase, most in ((x, most_x), (y, most_y))
         for waves in [powers(phase, most)]
         for part in (waves.real, waves.imag)
@@ -175,14 +176,14 @@ def sums_of_waves(x: np.ndarray, y: np.ndarray, most_x: int, most_y: int) -> np.
 
 
 def powers(phase: np.ndarray, most: int) -> np.ndarray:
-    """Return exp(i m phase) for m = 0 to `most`, which products give faster than exponentials."""
+    """Return exp(i m phase) for m = 0 to `most`; products are faster than exponentials."""
     factors = np.ones((most + 1, len(phase)), dtype=complex)
     factors[1:] = np.exp(1j * phase)
     return np.cumprod(factors, axis=0)
 
 
 def evenly(run: Run, frames: Index = slice(None), most: int = 50) -> list[int]:
-    """Select frames that are nearly equally spaced in time.
+    """Select frames at nearly equal intervals of time.
 
     Parameters
     ----------
@@ -191,12 +192,12 @@ def evenly(run: Run, frames: Index = slice(None), most: int = 50) -> list[int]:
     frames : ricochet.arrays.Index
         frames from which to select
     most : int
-        largest number of frames
+        largest number of selected frames
 
     Returns
     -------
     list of int
-        numbers of the frames, in increasing order
+        indices of the selected frames, in increasing order
 
     Examples
     --------
@@ -221,9 +222,10 @@ def averaged(
     Parameters
     ----------
     of : callable
-        function such as `pair_correlation` of a run, frames, edges and `more`, which returns (B,)
+        function such as `pair_correlation`, which returns (B,) values for a run, frames, edges and
+        `more`
     runs : sequence of Run
-        (R,) runs that differ by their seed
+        (R,) runs that differ only in their seed
     frames : sequence of Index
         (R,) frames of each run
     edges : numpy.ndarray
@@ -249,7 +251,7 @@ def averaged(
     if alone:
         parts = [(runs[0], [k]) for k in chosen(runs[0].n_frames, frames[0])]
     values = np.array([of(run, part, edges, *more) for run, part in parts])
-    seen = np.isfinite(values).any(axis=1)  # between close walls there may be no pairs
+    seen = np.isfinite(values).any(axis=1)  # there may be no pairs between walls close together
     known = np.isfinite(values[seen]).all(axis=0) & seen.any()
     columns = values[np.ix_(seen, known)]
     if not alone:
@@ -263,21 +265,21 @@ def largest_cluster(run: Run, frame: int, gap: float) -> int: ...
 @overload
 def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray: ...
 def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
-    """Return the number of disks in the largest cluster, a set connected by gaps below `gap`.
+    """Return the size of the largest cluster of disks, connected by gaps smaller than `gap`.
 
     Parameters
     ----------
     run : ricochet.Run
         a run in a box at rest
     frame : ricochet.arrays.Index
-        number of a frame, or index of several
+        index of one frame, or of several
     gap : float
-        largest gap between the rims of neighbouring disks [length]
+        largest gap between the rims of neighbours in a cluster [length]
 
     Returns
     -------
     int or numpy.ndarray
-        the number of disks, (F,) for several frames
+        number of disks in the cluster; (F,) for several frames
 
     Examples
     --------
@@ -302,19 +304,19 @@ def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
 
 
 def bond_order(run: Run, frame: Index) -> np.ndarray:
-    """Return the bond-orientational order psi6 of each disk from its Delaunay neighbours.
+    """Return the bond-orientational order psi6 of each disk, given by its Delaunay neighbours.
 
     Parameters
     ----------
     run : ricochet.Run
         any run
     frame : ricochet.arrays.Index
-        number of a frame, or index of several
+        index of one frame, or of several
 
     Returns
     -------
     numpy.ndarray
-        (N,) or (F, N) complex numbers, of modulus 1 for six neighbours at equal angles
+        (N,) or (F, N) complex numbers, with modulus 1 for six neighbours at equal angles
 
     Examples
     --------
@@ -326,7 +328,7 @@ def bond_order(run: Run, frame: Index) -> np.ndarray:
         each = chosen(run.n_frames, frame)
         return np.array([bond_order(run, k) for k in each]).reshape(-1, run.n_disks)
     near = 4 * np.sqrt(np.prod(run.edges) / run.n_disks)
-    points = run.position[frame]  # followed by periodic images near the box
+    points = run.position[frame]  # with periodic images near the box appended below
     for axis in np.flatnonzero(run.periodic):
         shift = np.where(np.arange(2) == axis, run.edges, 0.0)
         low = points[:, axis] < run.lower[axis] + near
@@ -346,9 +348,9 @@ def bond_order(run: Run, frame: Index) -> np.ndarray:
 def bond_correlation(
     run: Run, frames: Index, psi: Sequence[np.ndarray] | np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
-    """Return the correlation function g6(r) = Re <psi6*(0) psi6(r)> of bond order.
+    """Return the correlation function of bond order, g6(r) = Re <psi6*(0) psi6(r)>.
 
-    If there are many disks, distances r are measured only from some of them.
+    In large systems only some of the disks serve as centres.
 
     Parameters
     ----------

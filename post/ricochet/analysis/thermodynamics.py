@@ -1,8 +1,8 @@
-"""Pressure, collision rates and temperature of runs in equilibrium, with errors.
+"""Pressure, collision rates and temperature in equilibrium, with errors.
 
-The pressure P is measured in three independent ways: from the virial of the pair collisions, from
-the collision rate of equal disks, and from the force on the sides. The compressibility factor is Z
-= P / (n kT). The module `equilibrium` explains the parameter `skip`.
+Three independent methods yield the pressure P: the virial of the pair collisions, the collision
+rate (of equal disks), and the force on the walls. Z = P / (n kT) is the compressibility factor. For
+the parameter `skip` see the module `equilibrium`.
 """
 
 from typing import NamedTuple
@@ -38,10 +38,10 @@ __all__ = [
     "z_ways",
 ]
 
-TIMED = ("every_time", "at", "per_decade")  # schedules by time, not by collisions
-MANY = 1e8  # number of disks above which the effect of a fixed energy is negligible
-# Traits of `nature` of runs to which an equation of state applies. A run without any traits
-# consists of equal smooth disks with conserved energy in a periodic box.
+TIMED = ("every_time", "at", "per_decade")  # schedules by time rather than by collisions
+MANY = 1e8  # disks above which the effect of a fixed energy is negligible
+# Traits of `nature` with which an equation of state applies. A run without any trait consists of
+# equal smooth disks of conserved energy in a periodic box.
 FLUID = ("walls", "thermal_walls", "thermostatted", "rough", "rotating", "mixture")
 
 
@@ -49,11 +49,11 @@ class Steps(NamedTuple):
     """Changes of observables between successive samples in equilibrium."""
 
     time: np.ndarray  # (T,) duration
-    kt: np.ndarray  # (T,) mean over the duration
+    kt: np.ndarray  # (T,) mean during the step
     collisions: np.ndarray  # (T,) number of pair collisions
     virial: np.ndarray  # (T,)
-    hits: np.ndarray  # (T,) of all sides
-    impulse: np.ndarray  # (T, 4) by side
+    hits: np.ndarray  # (T,) number of collisions with all sides
+    impulse: np.ndarray  # (T, 4) momentum transferred to each side
 
 
 # --- temperature ---
@@ -62,20 +62,21 @@ class Steps(NamedTuple):
 def temperature(run: Run, skip: float | None = None) -> SeriesMean:
     """Estimate kT in equilibrium.
 
-    Samples at equal numbers of collisions are more frequent while a gas is hot, because its
-    collision rate is proportional to sqrt(kT). They are therefore weighted with 1 / sqrt(kT).
+    If samples are taken at equal numbers of collisions, they are more frequent while the gas is
+    hot, because the collision rate is proportional to sqrt(kT). Such samples are weighted with 1 /
+    sqrt(kT).
 
     Parameters
     ----------
     run : ricochet.Run
         a run in equilibrium
     skip : float, optional
-        collisions per disk that are left out [until no observable drifts]
+        collisions per disk discarded as equilibration [until no observable drifts]
 
     Returns
     -------
     SeriesMean
-        kT, whose error is 0 if the kinetic energy is conserved
+        kT, with an error of 0 if the kinetic energy is conserved
 
     Raises
     ------
@@ -93,7 +94,7 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def temperature_after(run: Run, start: float) -> SeriesMean:
-    """Estimate kT of a run whose kinetic energy fluctuates from the samples after a time."""
+    """Estimate kT from the samples after a given time, for a fluctuating kinetic energy."""
     track, time, kt = kt_in_time(run)
     kt, time = kt[time >= start], time[time >= start]
     by_time = (run.parameter("output", f"{track}_{how}") for how in TIMED)
@@ -108,9 +109,9 @@ def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
-    """Estimate the mean kinetic energy of a disk with a given mass in equilibrium, without gravity.
+    """Estimate the mean kinetic energy in equilibrium of a disk of given mass, without gravity.
 
-    It is smaller than kT if the total momentum is conserved.
+    If the total momentum is conserved, it is smaller than kT.
     """
     bound = (run.n_disks - free_disks(run)) * mass / run.mass.sum()
     moving = 0.5 * mass * float(np.sum(drift(run) ** 2))
@@ -121,7 +122,7 @@ def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
 
 
 def packing(run: Run) -> float:
-    """Return the packing fraction: the area of the disks divided by the area of the box.
+    """Return the packing fraction, the area of the disks over the area of the box.
 
     Parameters
     ----------
@@ -142,7 +143,7 @@ def packing(run: Run) -> float:
 
 
 def kinds_of_disks(run: Run) -> tuple[Species, ...]:
-    """Return the species; raise an error if disks of one species differ in mass or radius."""
+    """Return the species; raise Refused if disks of one species differ in mass or radius."""
     for kind in run.by_species:
         if not kind.alike:
             raise Refused(f"{run.path}: the disks of '{kind.name}' differ in mass or radius")
@@ -175,7 +176,7 @@ def mean_free_time(run: Run, start: float = 0.0) -> float:
     Raises
     ------
     RunError
-        if no two disks collided after `start`
+        if no pair of disks collided after `start`
 
     Examples
     --------
@@ -218,30 +219,30 @@ def steps(run: Run, skip: float | None = None) -> Steps:
 
 
 def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series whose means have as their ratio the rate of `amount` divided by kT^power.
+    """Return two series such that the ratio of their means is the rate of `amount` over kT^power.
 
-    The second series is kT^power to first order in the deviations of kT from its mean, so that the
-    error of the ratio includes the correlation between `amount` and kT.
+    To first order in the deviation of kT from its mean, the second series is kT^power. The error of
+    the ratio thus includes the correlation of `amount` with kT.
     """
     kt = float(np.average(s.kt, weights=s.time))
     return amount * kt**-power, s.time * (1 + power * (s.kt / kt - 1))
 
 
 def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series, calculated from the virial, whose means have the ratio Z - 1."""
+    """Return two series, based on the virial, such that the ratio of their means is Z - 1."""
     s = steps(run, skip)
     return over_kt(s.virial / (2 * run.n_disks), s, 1)
 
 
 def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
-    """Estimate the number of pair collisions of a disk per unit of time.
+    """Estimate the rate of pair collisions per disk.
 
     Parameters
     ----------
     run : ricochet.Run
         a run in equilibrium
     skip : float, optional
-        collisions per disk that are left out [until no observable drifts]
+        collisions per disk discarded as equilibration [until no observable drifts]
 
     Returns
     -------
@@ -272,7 +273,8 @@ def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
     """Estimate Z from the collision rate of equal disks; raise Refused without equilibrium."""
     s = steps(run, skip)
     turning = run.n_disks / 2 if run.nature & {"rough", "rotating"} else 0.0
-    share = free_disks(run) + turning if run.nature.keeps_energy else MANY  # a fixed energy
+    # degrees of freedom that share a fixed energy
+    share = free_disks(run) + turning if run.nature.keeps_energy else MANY
     unit = hard_disks.collision_rate(2.0, 2 * run.radius[0], share, 1.0, run.mass[0])
     return correlated_mean(*over_kt(s.collisions, s, 0.5)).scaled(2 / (run.n_disks * unit), 1.0)
 
@@ -280,7 +282,7 @@ def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
 def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     """Estimate Z = P A / (N kT) from the force of equal disks on four walls.
 
-    A is the area accessible to the centres. Refused is raised if the run does not reach
+    A is the area that disk centres can reach. Refused is raised if the run does not reach
     equilibrium.
     """
     s = steps(run, skip)
@@ -297,12 +299,12 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     run : ricochet.Run
         a run in equilibrium
     skip : float, optional
-        collisions per disk that are left out [until no observable drifts]
+        collisions per disk discarded as equilibration [until no observable drifts]
 
     Returns
     -------
     dict of str to SeriesMean
-        Z by method: "virial", "rate" for equal disks, and "walls" for a box with four walls
+        Z by method: "virial", "rate" (for equal disks) and "walls" (in a box with four walls)
 
     Raises
     ------
@@ -323,9 +325,9 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """Return "pressure_virial" and the pressure on each wall, "pressure_left" and so on.
+    """Return "pressure_virial", and the pressure on each wall as "pressure_left" and so on.
 
-    The unit is energy/length^2. Refused is raised if the run does not reach equilibrium.
+    Pressures are in energy/length^2. Refused is raised if the run does not reach equilibrium.
     """
     s = steps(run, skip)
     inside = correlated_mean(run.n_disks * s.kt * s.time + s.virial / 2, s.time)
@@ -343,9 +345,9 @@ def has_log(run: Run) -> bool:
 
 
 def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """Return collision rates "w_A_B" of a disk of species A with species B [1/time].
+    """Return the rates "w_A_B" [1/time] at which a disk of species A collides with species B.
 
-    RunError is raised without an event log.
+    RunError is raised if there is no event log.
     """
     log, species = run.event_log(), run.species - 1
     cuts = np.linspace(start_of_equilibrium(run, skip), run.time[-1], FINE + 1)
@@ -369,7 +371,7 @@ def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     run : ricochet.Run
         a run in equilibrium
     skip : float, optional
-        collisions per disk that are left out [until no observable drifts]
+        collisions per disk discarded as equilibration [until no observable drifts]
 
     Returns
     -------

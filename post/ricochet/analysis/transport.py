@@ -1,9 +1,9 @@
 """Transport coefficients: viscosities, thermal conductivity and diffusion coefficients.
 
-Viscosities and conductivity are calculated from Helfand moments, which docs/explanation/laws.md
-explains; rough disks are refused, because the moments do not include the rotational energy that
-they transport. Diffusion coefficients are calculated from displacements in equally spaced frames:
-the integral of <v(0) v(t)> needs no sum over frames, since the integral of v is the displacement.
+Viscosities and conductivity follow from Helfand moments (docs/explanation/laws.md). Rough disks are
+refused, because these moments do not include the transport of rotational energy. Diffusion
+coefficients follow from displacements in equally spaced frames. The integral of <v(0) v(t)> then
+requires no sum over frames, because the integral of v is the displacement.
 """
 
 from typing import NamedTuple
@@ -25,20 +25,21 @@ __all__ = [
     "coefficients",
 ]
 
-PER_FREE_TIME = 4  # sufficient number of samples of the moments
+PER_FREE_TIME = 4  # samples of the moments per mean free time that suffice
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
-# HEAT is the decay time of the heat flux in a dilute gas of equal disks, in mean free times; in a
-# denser gas it is shorter. MEMORY is the lag, in mean free times, at which transport coefficients
-# are evaluated. Between MEMORY / 2 and MEMORY, the slope of the mean square of a moment is on
-# average less than 0.2 % below that at infinite lag.
+# HEAT is the decay time of the heat flux in a dilute gas of equal disks, in mean free times; it is
+# shorter in a denser gas. MEMORY is the lag, in mean free times, at which transport coefficients
+# are evaluated: between MEMORY / 2 and MEMORY, the slope of the mean square of a moment is on
+# average less than 0.2 % below its limit at infinite lag.
 HEAT, MEMORY = 2.06, 20.0
-CLOSE = 1e-6  # relative difference of steps that are regarded as equal
+CLOSE = 1e-6  # relative difference below which steps count as equal
 UNLIKE = 0.05  # largest relative difference of Enskog's viscosity between runs of one group
 TAKES = (
     "transport coefficients require elastic smooth disks in a periodic box; for other disks see "
     "driven.py --show viscosity (box.shear_rate) and D(t) of correlations.py"
 )
-MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # coefficients from Helfand moments
+# coefficients that follow from Helfand moments
+MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")
 
 
 def in_step(times: np.ndarray) -> bool:
@@ -51,16 +52,16 @@ def in_step(times: np.ndarray) -> bool:
 
 
 def lags(frames: int, per_decade: int = 12) -> np.ndarray:
-    """Return logarithmically spaced lags, in numbers of frames, up to half of the run."""
+    """Return logarithmically spaced lags of up to half the number of frames."""
     last = max(1, frames // 2)
     count = 1 + int(per_decade * np.log10(last))
     return np.unique(np.geomspace(1, last, count).round().astype(int))
 
 
 def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
-    """Return unwrapped positions (T, N, 2) and velocities (T, N, 2).
+    """Return unwrapped positions and velocities, (T, N, 2) each.
 
-    They are relative to the centre of mass along axes where its velocity is conserved.
+    Along axes where the velocity of the centre of mass is conserved, they are relative to it.
     """
     kept = comoving(run)
     place, velocity = (
@@ -71,9 +72,9 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 
 
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
-    """Return the lag, in frames, in which sound crosses the box; at most 1/8 of the shortest run.
+    """Return the lag, in frames, in which sound crosses the box, or 1/8 of the run if shorter.
 
-    At longer lags the size of the box affects diffusion.
+    At longer lags diffusion depends on the size of the box.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
     kt = td.temperature(run).mean
@@ -85,10 +86,10 @@ def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
 def diffusion(run: Run, frames: slice, lag: int, *species: str) -> list[tuple[SeriesMean, ...]]:
     """Return two estimates of the diffusion coefficient D for all disks and for each species.
 
-    The first is a quarter of the slope of the mean square displacement over the lags from `lag` / 2
-    to `lag`, in frames. The second is the mean over these lags of half the integral of <v(0) v>,
-    which is interpolated between frames by a cubic curve with the known slopes; for an exponential
-    decay this changes D by at most 0.2 %. Both errors include correlations between starting frames.
+    The first is a quarter of the slope of the mean square displacement between the lags `lag` / 2
+    and `lag`, in frames. The second is half the integral of <v(0) v>, averaged over the same range
+    of lags. Between frames a cubic curve with known slopes interpolates; for an exponential decay
+    this changes D by at most 0.2 %. Both errors account for correlations between time origins.
     """
     place, velocity = motion(run, frames)
     disks = [run.mass > 0, *(run.of_species(name) for name in species)]
@@ -97,7 +98,7 @@ def diffusion(run: Run, frames: slice, lag: int, *species: str) -> list[tuple[Se
 
 
 def of_paths(x: np.ndarray, v: np.ndarray, step: float, lag: int) -> tuple[SeriesMean, ...]:
-    """Return both estimates of D for disks with positions and velocities (T, N, 2)."""
+    """Return both estimates of D for disks with the given positions and velocities (T, N, 2)."""
     origins, half = len(x) - lag, lag // 2
     near, far = (np.sum((x[k : k + origins] - x[:origins]) ** 2, axis=2) for k in (half, lag))
     spread = (far - near).mean(axis=1) / (4 * step * (lag - half))
@@ -113,9 +114,9 @@ def of_paths(x: np.ndarray, v: np.ndarray, step: float, lag: int) -> tuple[Serie
 def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     """Return the sampling interval, and the Helfand moments relative to the centre of mass.
 
-    The momentum moments have the components xy and (xx - yy) / 2 for the shear viscosity, and (xx +
-    yy) / 2 for the bulk viscosity. The energy moment has the components x and y. Each moment has
-    the shape (T, C), and its mean growth is subtracted. RunError is raised if there are no moments
+    The moment of momentum has the components xy and (xx - yy) / 2 for the shear viscosity, and (xx
+    + yy) / 2 for the bulk viscosity; that of energy has the components x and y. Each moment has the
+    shape (T, C), and its mean growth is subtracted. RunError is raised if no moments were sampled
     at equal intervals after `start`.
     """
     allow(run, TAKES, "mixture")
@@ -131,9 +132,9 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
         )
     flown, handed, heat, heat_handed = (part.value[first:-1] for part in parts)
     momentum = (flown + handed).reshape(-1, 2, 2)
-    # To convert the energy moments to the frame of the centre of mass, its velocity times the
-    # momentum moment is subtracted. All other terms of the conversion grow linearly in time, and
-    # are removed with the mean growth.
+    # The energy moments are converted to the centre-of-mass frame by subtracting the velocity of
+    # the centre of mass times the momentum moment. All other terms of the conversion grow linearly
+    # in time and vanish with the mean growth.
     heat = heat + heat_handed - np.einsum("a,tab->tb", drift(run), momentum)
     xx, xy, yy = momentum[:, 0, 0], momentum[:, 0, 1], momentum[:, 1, 1]
     groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
@@ -149,8 +150,8 @@ def squares(moment: np.ndarray, lag: int) -> np.ndarray:
     """Return the squared change of a Helfand moment during a lag, averaged over its components.
 
     The moment has the shape (T, C), and the result (T - lag,). Subtracting the mean growth, as
-    `moments` does, reduces the squares by the fraction lag / (T - 1) on average. The result is
-    corrected for this.
+    `moments` does, reduces the squares on average by the fraction lag / (T - 1), for which the
+    result is corrected.
     """
     gain = moment[lag:] - moment[: len(moment) - lag]
     return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))
@@ -167,11 +168,11 @@ def relative_error(samples: int, lag: int) -> float:
 
     If `lag` is much longer than the decay time of the fluxes, the `samples` values of the moment
     form a random walk, and the coefficient is a quadratic form of its Gaussian steps. The
-    covariance of two squared increments is then twice the squared number of steps that both
-    contain.
+    covariance of two squared increments is then twice the square of the number of steps they have
+    in common.
     """
     half, origins = lag // 2, samples - lag
-    apart = np.arange(-lag, lag + 1)  # origin of the second increment minus that of the first
+    apart = np.arange(-lag, lag + 1)  # origin of the second increment relative to that of the first
     pairs = np.maximum(0, origins - np.abs(apart))
 
     def common(first: int, second: int) -> np.ndarray:
@@ -184,10 +185,10 @@ def relative_error(samples: int, lag: int) -> float:
 def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
     """Estimate a transport coefficient from the increments of a Helfand moment (T, C).
 
-    It is half the slope of the mean squared increment between `lag` / 2 and `lag`. Each sample at
-    which such an interval starts yields a value. These values are too few and too far from Gaussian
-    for an error, which is that of `relative_error` for C components; only the drift is that of the
-    series.
+    It is half the slope of the mean squared increment between the lags `lag` / 2 and `lag`. Each
+    time origin yields a value. These values are too few, and too far from Gaussian, for an estimate
+    of the error, which is therefore that of `relative_error` for C components. The drift is that of
+    the series of values.
     """
     half = lag // 2
     near, far = squares(moment, half), squares(moment, lag)
@@ -202,20 +203,20 @@ def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
 
 
 class Found(NamedTuple):
-    """A transport coefficient at one packing fraction, relative to Enskog's value."""
+    """Transport coefficient at one packing fraction, relative to Enskog's value."""
 
-    members: list[SeriesMean]  # values of the runs
-    curve: Curve  # against the lag, in mean free times
-    lag: float  # at which the values were measured [mean free times]
-    memory: float  # lag required by the decay times; 0 for D
-    enskog: float  # in units of the mean mass, the mean diameter and kT
+    members: list[SeriesMean]  # values measured in the runs
+    curve: Curve  # as a function of the lag [mean free times]
+    lag: float  # lag at which the values were measured [mean free times]
+    memory: float  # lag that the decay times require [mean free times]; 0 for D
+    enskog: float  # Enskog's value, in units of the mean mass, the mean diameter and kT
 
 
 def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
     """Return the transport coefficients of Enskog's theory for the disks of a run, by name.
 
-    The energy of the run must be conserved. Disks that differ by less than 1 % in diameter and mass
-    are one species. If `reduced`, the units are the mean mass, the mean diameter and kT.
+    The energy of the run must be conserved. Disks whose diameters and masses differ by less than 1
+    % count as one species. If `reduced`, the units are the mean mass, the mean diameter and kT.
     """
     eta, kt = td.packing(run), 1.0 if reduced else td.kt_at_start(run)
     z, area = hard_disks.henderson(eta), float(np.prod(run.edges))
@@ -253,7 +254,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
             f"{runs[0].path}: needs more than eight collisions per disk in equilibrium, and "
             "observables more often than each tenth"
         )
-    at = lags(4 * lag)  # lags up to twice the lag of the result
+    at = lags(4 * lag)  # up to twice the lag of the result
     middle = (at + np.append(0, at[:-1])) / 2 / per_free_time
     found = {}
     for name in each[0][1]:
@@ -271,7 +272,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
 
 
 def frames_in_step(run: Run, start: float) -> slice:
-    """Return the equally spaced frames in equilibrium, without the last frame."""
+    """Return the equally spaced frames in equilibrium except the last one."""
     frames = slice(int(np.searchsorted(run.time, start)), run.n_frames - 1)
     if len(run.time[frames]) < 17 or not in_step(run.time[frames]):
         raise RunError(
@@ -307,12 +308,12 @@ def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]
     runs : list of Run
         (R,) runs of one system, with `output.helfand`
     skip : float, optional
-        collisions per disk that are left out [until no observable drifts]
+        collisions per disk discarded as equilibration [until no observable drifts]
 
     Returns
     -------
     dict of str to Found
-        "viscosity" and "bulk_viscosity", "conductivity" for equal disks, and "D" if there are
+        "viscosity" and "bulk_viscosity"; "conductivity" for equal disks; "D" if the runs have
         frames
 
     Raises
@@ -320,7 +321,7 @@ def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]
     RunError
         if a run is too short, or has no Helfand moments
     Refused
-        if a run is not in equilibrium, or has walls
+        if a run has walls, or is not in equilibrium
 
     Examples
     --------
