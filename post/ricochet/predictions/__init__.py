@@ -1,1 +1,1 @@
-"""Theoretical formulas for comparison with measured values; the formulas do not read runs."""
+"""Theoretical formulas for comparison with measurements; they do not read runs."""

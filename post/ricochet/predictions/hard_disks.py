@@ -1,7 +1,8 @@
-"""Published results for hard disks: equation of state, collision rates, cooling, diffusion.
+"""Published results for hard disks: equation of state, collision rates, cooling, transport.
 
-Symbols: eta packing fraction, n disks per area, s diameter, m mass, w pair collisions per disk and
-time, chi pair correlation function at contact, Z = P / (n kT) compressibility factor.
+Symbols: eta is the packing fraction, n the number of disks per area, s the diameter, m the mass, w
+the rate of pair collisions per disk, chi the pair correlation function at contact, and Z = P / (n
+kT) the compressibility factor.
 """
 
 import math
@@ -27,31 +28,30 @@ __all__ = [
 ]
 
 CLOSE_PACKING = math.pi / math.sqrt(12)
-# Packing fractions and Z of the fluid, from published simulations. The values up to the packing
-# fraction 0.5 are from Kolafa and Rottner, Molecular Physics 104, 3435 (2006), and the values above
-# 0.5 from Erpenbeck and Luban, Physical Review A 32, 2920 (1985).
+# Packing fractions and Z of the fluid from published simulations: Kolafa and Rottner, Molecular
+# Physics 104, 3435 (2006), up to 0.5; Erpenbeck and Luban, Physical Review A 32, 2920 (1985),
+# above.
 FLUID = np.array([
     (0.05, 1.10839), (0.10, 1.23614), (0.15, 1.38804), (0.20, 1.57037), (0.25, 1.79159),
     (0.30, 2.06326), (0.35, 2.40150), (0.40, 2.82933), (0.45, 3.38054), (0.50, 4.10636),
     (CLOSE_PACKING / 1.6, 5.4963), (CLOSE_PACKING / 1.5, 6.6074), (CLOSE_PACKING / 1.4, 8.306),
 ])  # fmt: skip
-# Packing fractions and Z of the fluid near freezing. No published values are known between the
-# packing fractions 0.648 and 0.698. The values below 0.698 were computed with Ricochet from two
-# runs of 8000 disks and 1000 collisions per disk at each packing fraction; their errors are below
-# 0.1 %. The value at 0.698, where the fluid freezes, is the published value for 1024^2 disks in
-# `MELTING`.
+# Packing fractions and Z of the fluid near freezing. We know no published values between the
+# packing fractions 0.648 and 0.698; the ones given here were computed with Ricochet, from two runs
+# of 8000 disks and 1000 collisions per disk at each packing fraction, with errors below 0.1 %. The
+# value at 0.698, where the fluid freezes, is the published one for 1024^2 disks in `MELTING`.
 FREEZING = np.array([
     (0.66, 8.875), (0.67, 9.350), (0.68, 9.839), (0.69, 10.234),
     (0.698, 9.16934 * math.pi / 4 / 0.698),
 ])  # fmt: skip
-# Coefficient c of the equation Z_N = Z + c / N, where Z_N is the value for N disks in a periodic
-# box, at the first ten packing fractions of `FLUID`.
+# Coefficient c of the finite-size correction Z_N = Z + c / N for N disks in a periodic box, at the
+# first ten packing fractions of `FLUID`.
 SHIFT = np.array(
     [-0.1036, -0.2152, -0.3361, -0.4680, -0.6131, -0.7741, -0.9549, -1.1605, -1.3981, -1.6776]
 )
-# Packing fractions and P d^2 / kT near melting in periodic boxes, where d is the diameter. The
-# values for 128^2 disks are from Li et al., Journal of Chemical Physics 157, 234111 (2022). The
-# values for 256^2 and 1024^2 disks are from Engel et al., Physical Review E 87, 042134 (2013).
+# Packing fractions and P d^2 / kT near melting in periodic boxes, where d is the diameter: Li et
+# al., Journal of Chemical Physics 157, 234111 (2022), for 128^2 disks; Engel et al., Physical
+# Review E 87, 042134 (2013), for 256^2 and 1024^2 disks.
 MELTING = {
     "128² disks, Li et al. 2022": [
         (0.698, 9.1741), (0.704, 9.1856), (0.708, 9.1763), (0.712, 9.1655),
@@ -72,7 +72,7 @@ MELTING = {
 
 @cache
 def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
-    """Return splines of the smooth product Z (1 - eta)^2 and of c in Z_N = Z + c / N."""
+    """Return splines of Z (1 - eta)^2, which is smooth, and of c in Z_N = Z + c / N."""
     eta, z = np.concatenate([FLUID, FREEZING]).T
     smooth = scipy.interpolate.CubicSpline(np.append(0, eta), np.append(1, z * (1 - eta) ** 2))
     return smooth, scipy.interpolate.CubicSpline(
@@ -104,8 +104,8 @@ def henderson(eta: Number) -> Number:
 def simulated(eta: ArrayLike) -> np.ndarray:
     """Return Z of the fluid, interpolated between simulations.
 
-    The simulations are published up to a packing fraction of 0.648 and at 0.698; those in between
-    are unpublished ones with Ricochet.
+    The simulations are published for packing fractions up to 0.648 and for 0.698; those in between
+    were run with Ricochet.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def simulated(eta: ArrayLike) -> np.ndarray:
 
 
 def simulated_finite(eta: ArrayLike, count: int) -> np.ndarray:
-    """Return Z (...) of a fluid of `count` disks in a periodic box, for eta (...) up to 0.5."""
+    """Return Z (...) of `count` disks of fluid in a periodic box, for eta (...) up to 0.5."""
     return simulated(eta) + splines()[1](eta) / count
 
 
@@ -159,18 +159,18 @@ def crystal(eta: Number, count: float = math.inf) -> Number:
 def adiabat(
     widths: np.ndarray, height: float, count: int, radius: float, walled: bool
 ) -> np.ndarray:
-    """Return temperatures (W,) of a gas between two walls at slowly changing distances (W,).
+    """Return the temperatures (W,), relative to the first, of a gas between walls moved slowly.
 
-    They are relative to that at `widths[0]`. If the other two sides are not `walled`, momentum
-    along them is conserved, and the kinetic energy is (N - 1/2) kT instead of N kT. It changes by
-    -F dw, where F is P h minus the tension of the two other walls, h the height and P follows from
-    `simulated`. In scaled particle theory a wall has the tension kT n r / (1 - eta) and a deficit
-    of n r (1 - eta) / (1 + eta) disks per length (Helfand, Frisch and Lebowitz, Journal of Chemical
-    Physics 34, 1037 (1961)).
+    The `widths` (W,) are the distances of the two walls, and `height` is that of the other two
+    sides. Unless these are `walled`, momentum along them is conserved and the kinetic energy is
+    (N - 1/2) kT in place of N kT. Work changes it by -F dw, where F is P h minus the tension of the
+    two other walls, and P is that of `simulated`. In scaled particle theory, the tension of a wall
+    is kT n r / (1 - eta), and n r (1 - eta) / (1 + eta) disks per length are missing beside it
+    (Helfand, Frisch and Lebowitz, Journal of Chemical Physics 34, 1037 (1961)).
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FREEZING[-1, 0], 50001)  # far from the walls
-    layer = 2 * radius * (1 - eta) / (1 + eta)  # of both walls
+    layer = 2 * radius * (1 - eta) / (1 + eta)  # disks missing beside both walls, over n
     width = area / eta / (height - walled * layer) + layer
     force = eta / area * (simulated(eta) * height - walled * 2 * radius / (1 - eta))  # over N kT
     rise = -np.append(0, np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(width)))
@@ -182,7 +182,7 @@ def adiabat(
 def published(eta: float, count: int, periodic: bool) -> float:
     """Return Z from simulations: of the fluid up to eta = 0.648, of the crystal from eta = 0.72.
 
-    In between, Z is NaN. It is that of `count` disks if the box is `periodic`.
+    In between, Z is NaN. If the box is `periodic`, Z is that of `count` disks.
     """
     if eta <= 0.5:
         return float(simulated_finite(eta, count) if periodic else simulated(eta))
@@ -192,9 +192,9 @@ def published(eta: float, count: int, periodic: bool) -> float:
 
 
 def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
-    """Return Z of a fluid of disks with different radii r, from Z of equal disks and <r>^2 / <r^2>.
+    """Return Z of a fluid of disks of different radii r, from `z` of equal disks and <r>^2 / <r^2>.
 
-    With the exact second virial coefficient; if `z` is that of scaled particle theory, so is the
+    The second virial coefficient is exact. If `z` is that of scaled particle theory, so is the
     result (Santos, Yuste and Lopez de Haro, Molecular Physics 96, 1 (1999)).
     """
     return (1 - alike) / (1 - eta) + alike * z
@@ -208,7 +208,7 @@ def contact_value(z: Number, eta: Number) -> Number:
 def collision_rate(
     z: float, diameter: float, free: float, kt: float = 1.0, mass: float = 1.0
 ) -> float:
-    """Return the collision rate per disk that follows from the pressure.
+    """Return the rate of pair collisions per disk that corresponds to a pressure.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def collision_rate(
     free : float
         number of disks that share the energy: N between walls, N - 1 in a periodic box
     kt, mass : float
-        temperature and mass of a disk
+        temperature [energy], and mass of a disk
 
     Returns
     -------
@@ -231,8 +231,8 @@ def collision_rate(
     >>> round(hard_disks.collision_rate(2.0, 1.0, 1e4), 3)
     2.257
     """
-    # c_n is the mean relative speed of two disks in a system with fixed total energy, divided by
-    # the mean relative speed of two disks whose velocities have Maxwell's distribution.
+    # c_n is the mean relative speed of two disks in a system of fixed total energy, relative to
+    # that of two disks with Maxwellian velocities.
     c_n = math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
     return 4 * (z - 1) * c_n / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
 
@@ -241,12 +241,12 @@ def haff_rate(xi: float) -> float:
     """Return the cooling rate -d ln K / d tau of a homogeneous gas.
 
     K is the kinetic energy and tau the number of collisions per disk. The second Sonine coefficient
-    is that of van Noije and Ernst, Granular Matter 1, 57 (1998).
+    is taken from van Noije and Ernst, Granular Matter 1, 57 (1998).
 
     Parameters
     ----------
     xi : float
-        restitution
+        coefficient of restitution
 
     Returns
     -------
@@ -263,7 +263,7 @@ def haff_rate(xi: float) -> float:
 
 
 def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
-    """Return K / K0 (T,) of a homogeneous cooling gas at tau (T,) collisions per disk."""
+    """Return K / K(0) (T,) of a homogeneous cooling gas after tau (T,) collisions per disk."""
     return np.exp(-haff_rate(xi) * np.asarray(tau))
 
 
@@ -275,12 +275,12 @@ def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
     w0_t : array_like
         (T,) time in initial mean free times
     xi : float
-        restitution
+        coefficient of restitution
 
     Returns
     -------
     numpy.ndarray
-        (T,) kinetic energy over its initial value
+        (T,) kinetic energy relative to its initial value
 
     Examples
     --------
@@ -291,11 +291,10 @@ def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
 
 
 def haff_soft(law: Restitution, thermal: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return w0 t, collisions per disk and K / K0 of a cooling gas of viscoelastic disks.
+    """Return w0 t, collisions per disk and K / K(0) of a cooling gas of viscoelastic disks.
 
-    w0 is the initial collision rate, and `thermal` the initial sqrt(kT/m). For Maxwell's
-    distribution m g^2 / 4 kT is distributed exponentially, where g is the relative normal speed of
-    a collision.
+    w0 is the initial collision rate and `thermal` the initial sqrt(kT/m). If g is the relative
+    normal velocity of a collision, m g^2 / 4 kT is distributed exponentially in a Maxwellian gas.
     """
     k, u = np.geomspace(1, 1e-26, 1000), np.linspace(0, 40, 2001)
     g = 2 * thermal * np.sqrt(k[:, None] * u)
@@ -310,15 +309,15 @@ def noise_temperature(
 ) -> float:
     """Return the temperature at which dissipation balances white-noise driving.
 
-    The formula is that of van Noije and Ernst, Granular Matter 1, 57 (1998), for Maxwell's
-    distribution and chi from Henderson's equation of state.
+    The formula is that of van Noije and Ernst, Granular Matter 1, 57 (1998), for Maxwellian
+    velocities, with chi from Henderson's equation of state.
 
     Parameters
     ----------
     strength : float
-        increase of the variance of each velocity component per time [velocity^2/time]
+        rate at which driving increases the variance of each velocity component [velocity^2/time]
     xi : float
-        restitution
+        coefficient of restitution
     eta : float
         packing fraction
     diameter, mass : float
@@ -341,7 +340,7 @@ def noise_temperature(
 
 
 def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
-    """Return the adiabatic speed of sound of the fluid [velocity] with Henderson's formula for Z.
+    """Return the adiabatic speed of sound of the fluid [velocity] for Henderson's Z.
 
     It is the square root of (d(eta Z)/d eta + Z^2) kT / m.
     """
@@ -355,8 +354,8 @@ def enskog(
 ) -> dict[str, float]:
     """Return the transport coefficients of Enskog's theory.
 
-    The formulas are those of Gass, Journal of Chemical Physics 54, 1898 (1971). Only collisions
-    contribute to the bulk viscosity; D is the first Sonine approximation.
+    The formulas are those of Gass, Journal of Chemical Physics 54, 1898 (1971). The bulk viscosity
+    is due to collisions alone. D is the first Sonine approximation.
 
     Parameters
     ----------
@@ -370,7 +369,7 @@ def enskog(
     Returns
     -------
     dict of str to float
-        "viscosity", "bulk_viscosity", "conductivity" (Boltzmann's constant is 1) and "D"
+        "viscosity", "bulk_viscosity", "conductivity" (with Boltzmann's constant 1) and "D"
 
     Examples
     --------
@@ -391,9 +390,10 @@ def enskog(
 def long_time_tail(
     time: np.ndarray, density: float, diffusion: float, viscosity: float
 ) -> np.ndarray:
-    """Return the long-time tail of <v(0) v(t)> / <v^2>, (T,), from mode-coupling theory.
+    """Return the long-time tail (T,) of <v(0) v(t)> / <v^2> according to mode-coupling theory.
 
-    `density` is in disks per area, `diffusion` coefficient and kinematic `viscosity` in
-    length^2/time (Dorfman and Cohen, Physical Review Letters 25, 1257 (1970)).
+    `density` is in disks per area; `diffusion`, the diffusion coefficient, and `viscosity`, the
+    kinematic one, are in length^2/time (Dorfman and Cohen, Physical Review Letters 25, 1257
+    (1970)).
     """
     return 1 / (8 * math.pi * density * (diffusion + viscosity) * np.asarray(time))

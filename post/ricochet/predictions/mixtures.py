@@ -1,6 +1,6 @@
 """Published results for mixtures of hard disks: collisions, transport, cooling.
 
-S is the number of species, and `z` is Z = P / (n kT) of equal disks at the packing fraction of the
+S is the number of species. `z` is Z = P / (n kT) of equal disks at the packing fraction of the
 mixture.
 """
 
@@ -15,10 +15,10 @@ __all__ = ["cooling_ratio", "self_diffusion"]
 
 
 def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.ndarray:
-    """Return the pair correlations at contact (S, S) of a mixture of S species, within about 1 %.
+    """Return the pair correlation functions at contact (S, S) of a mixture, to about 1 %.
 
-    The formula of Jenkins and Mancini, Journal of Applied Mechanics 54, 27 (1987), is used with chi
-    of equal disks calculated from `z`, as by Santos, Yuste and Lopez de Haro, Journal of Chemical
+    They are those of Jenkins and Mancini, Journal of Applied Mechanics 54, 27 (1987), but with chi
+    of equal disks calculated from `z`, as in Santos, Yuste and Lopez de Haro, Journal of Chemical
     Physics 117, 5785 (2002).
     """
     eta = math.pi / 4 * np.sum(density * diameter**2)
@@ -30,22 +30,26 @@ def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.nd
 def enskog_mixture(
     z: float, density: np.ndarray, diameter: np.ndarray, mass: np.ndarray, kt: float = 1.0
 ) -> dict[str, float]:
-    """Return viscosities of a mixture of S species, and the decay time "memory" of the fluxes.
+    """Return the viscosities of a mixture, and the decay time "memory" of its fluxes.
 
-    The first Sonine approximation of Lopez de Haro, Cohen and Kincaid, Journal of Chemical Physics
-    78, 2746 (1983), is used in two dimensions. The kinetic part of the shear viscosity is
-    multiplied by 1.022, as higher approximations do for a dilute gas of equal disks. The bulk
-    viscosity includes the different temperatures of the species during an expansion.
+    The theory is the first Sonine approximation of Lopez de Haro, Cohen and Kincaid, Journal of
+    Chemical Physics 78, 2746 (1983), in two dimensions. The kinetic part of the shear viscosity is
+    multiplied by 1.022, the effect of higher approximations in a dilute gas of equal disks. The
+    bulk viscosity accounts for the unequal temperatures of the species during an expansion.
     """
     total, pair = mass[:, None] + mass, (diameter[:, None] + diameter) / 2
     reduced = mass[:, None] * mass / total
-    met = density * pair * contact_values(z, density, diameter)  # (i, j)
-    rate = met * 2 * np.sqrt(2 * math.pi * kt * reduced) / total  # 2 of it: of temperatures
-    handed = 1 + math.pi / 2 * np.sum(met * pair * mass / total, axis=1)  # with collisions
+    # rates (i, j) of collisions of species i with j, except for the factor of the mean relative
+    # speed
+    met = density * pair * contact_values(z, density, diameter)
+    # twice this rate applies to temperatures
+    rate = met * 2 * np.sqrt(2 * math.pi * kt * reduced) / total
+    # with the transfer in collisions
+    handed = 1 + math.pi / 2 * np.sum(met * pair * mass / total, axis=1)
     stress = np.diag(np.sum(rate * (2 + mass / mass[:, None]), axis=1)) - rate
     lives = np.linalg.solve(stress, handed)
     sums, share = 2 * rate.sum(axis=1), density / density.sum()
-    heat = np.diag(sums) - 2 * rate + sums.max() * share  # conserved mean
+    heat = np.diag(sums) - 2 * rate + sums.max() * share  # conserves the mean
     cooler = np.linalg.solve(heat, 2 * handed - 2 * share @ handed)
     together = np.sum(density[:, None] * met * pair**2 * np.sqrt(math.pi / 2 * kt * reduced))
     slowest = min(np.linalg.eigvals(matrix).real.min() for matrix in (stress, heat))
@@ -61,10 +65,10 @@ def self_diffusion(
 ) -> np.ndarray:
     """Return the diffusion coefficient of single disks of each species in Enskog's theory.
 
-    It is D_i = kT / sum_j z_ij with z_ij = 2 n_j s_ij chi_ij sqrt(2 pi m_ij kT), the mean diameter
-    s_ij and the reduced mass m_ij, in the first Sonine approximation; higher ones increase D of
-    light tracers. A species of density 0 consists of tracers, which collide with other species
-    only.
+    In the first Sonine approximation, D_i = kT / sum_j z_ij with z_ij = 2 n_j s_ij chi_ij sqrt(2 pi
+    m_ij kT), where s_ij is the mean diameter and m_ij the reduced mass of the pair. Higher
+    approximations increase D of light tracers. A species of density 0 consists of tracers, which
+    collide only with other species.
 
     Parameters
     ----------
@@ -99,21 +103,22 @@ def self_diffusion(
 def cooling_ratio(
     mass_ratio: float, restitution: float, share: float = 0.5, diameter_ratio: float = 1.0
 ) -> float:
-    """Return the ratio of the temperatures of two species in a dilute gas that cools.
+    """Return the ratio of the temperatures of two species in a cooling dilute gas.
 
-    Both species cool at one rate. The rates are those of Garzo and Dufty, Physical Review E 60,
-    5706 (1999), in two dimensions, for Maxwell's distribution in each species.
+    The ratio is that at which both species cool at the same rate. The rates are those of Garzo and
+    Dufty, Physical Review E 60, 5706 (1999), in two dimensions, for Maxwellian velocities in each
+    species.
 
     Parameters
     ----------
     mass_ratio : float
-        mass of the disks of the second species divided by that of the first
+        mass of a disk of the second species divided by that of the first
     restitution : float
         coefficient of normal restitution of all collisions
     share : float
-        fraction of the disks that belong to the second species
+        fraction of the disks in the second species
     diameter_ratio : float
-        diameter of the disks of the second species divided by that of the first
+        diameter of a disk of the second species divided by that of the first
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """Theoretical results: speed distributions, scattering, relaxation, rough disks, two chambers.
 
-All results are for two dimensions; u = v / sqrt(2 kT / m) is the reduced speed.
+All results are for two dimensions. u = v / sqrt(2 kT / m) is the reduced speed.
 """
 
 from collections.abc import Callable
@@ -17,20 +17,18 @@ __all__ = [
     "scattering_angle",
 ]
 
-#: Type of a distribution function or of a probability density.
+#: Cumulative distribution function or probability density.
 Law = Callable[[np.ndarray], np.ndarray]
 
-# Relaxation of a dilute gas of disks that start with equal speeds, from Monte Carlo solutions of
-# the Boltzmann equation with 10^6 disks. The first list of `RELAXATION` contains numbers of
-# collisions per disk, and the second list contains the second Sonine coefficient a2 after each of
-# these numbers of collisions.
+# Relaxation of a dilute gas of disks with equal initial speeds, from Monte Carlo solutions of the
+# Boltzmann equation with 10^6 disks: collisions per disk, and the second Sonine coefficient a2
+# after as many collisions.
 RELAXATION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (-0.5, -0.370, -0.264, -0.184, -0.125, -0.0855, -0.0565, -0.025)]
 )
-# Relaxation of a dilute mixture, from Monte Carlo solutions of the Boltzmann equation: half of the
-# disks have the mass m, and half the mass 4 m. The first list of `EQUIPARTITION` contains numbers
-# of collisions per disk. The second list of `EQUIPARTITION` contains the temperature of the heavy
-# disks divided by the temperature of the light disks, after each of these numbers of collisions.
+# Relaxation of a dilute mixture, in which half of the disks have the mass m and half the mass 4 m,
+# from Monte Carlo solutions of the Boltzmann equation: collisions per disk, and the temperature of
+# the heavy disks over that of the light ones after as many collisions.
 EQUIPARTITION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005)]
 )
@@ -58,7 +56,7 @@ def maxwell_pdf(u: np.ndarray) -> np.ndarray:
 
 
 def maxwell_cdf(u: np.ndarray) -> np.ndarray:
-    """Return the distribution function of the reduced speed in equilibrium.
+    """Return the cumulative distribution function of the reduced speed in equilibrium.
 
     Parameters
     ----------
@@ -81,9 +79,9 @@ def maxwell_cdf(u: np.ndarray) -> np.ndarray:
 def finite_n_cdf(count: int, periodic: bool = False) -> Law:
     """Return the exact distribution function of u = v / sqrt(2 kT / m) at fixed total energy N kT.
 
-    The share K / E of a disk has the distribution Beta(1, N - 1) in a box with walls, for any
-    masses. In a periodic box of equal disks without total momentum, that of K N / (E (N - 1)) is
-    Beta(1, N - 2). N is `count`.
+    In a box with walls, the fraction K / E of the energy that a disk has is distributed as Beta(1,
+    N - 1), for any masses. In a periodic box, for equal disks without total momentum, K N / (E (N -
+    1)) is distributed as Beta(1, N - 2). N is `count`.
     """
     free, scale = (count - 2, count - 1) if periodic else (count - 1, count)
     return lambda u: 1 - np.clip(1 - np.square(u) / scale, 0, 1) ** free
@@ -92,8 +90,8 @@ def finite_n_cdf(count: int, periodic: bool = False) -> Law:
 def path_density(x: np.ndarray) -> np.ndarray:
     """Return the probability density (n,) of free paths x (n,), in units of the mean <v> / w.
 
-    Under molecular chaos, the collision rate nu(v) of a disk is proportional to its mean relative
-    speed in a gas with Maxwell's distribution.
+    Under molecular chaos, the collision rate nu(v) of a disk is proportional to its mean speed
+    relative to a Maxwellian gas.
     """
     u = np.linspace(0, 5, 2001)[1:]  # v / sqrt(2 kT / m)
     half = u**2 / 2
@@ -108,7 +106,7 @@ def path_density(x: np.ndarray) -> np.ndarray:
 def scattering_angle(
     b: ArrayLike, mass_ratio: float = np.inf, restitution: float = 1.0
 ) -> np.ndarray:
-    """Return the scattering angle of a disk that collides with a smooth disk at rest.
+    """Return the scattering angle of a disk that hits a smooth disk at rest.
 
     Parameters
     ----------
@@ -117,12 +115,12 @@ def scattering_angle(
     mass_ratio : float
         mass of the disk at rest divided by that of the moving disk
     restitution : float
-        normal restitution
+        coefficient of normal restitution
 
     Returns
     -------
     numpy.ndarray
-        (...) angle [rad]; 2 acos(b) for an elastic collision with an infinite mass
+        (...) angle [rad]; 2 acos(b) for an elastic collision with an infinitely heavy disk
 
     Examples
     --------
@@ -135,19 +133,18 @@ def scattering_angle(
     return np.arctan2(2 * kappa * b * cosine, 1 - 2 * kappa * cosine**2)
 
 
-# Steady temperature ratio T_rot / T of cooling rough disks for pairs (xi, beta) of normal and
-# tangential restitution. The rough disks have the moment of inertia m r^2 / 2 and no Coulomb limit
-# of the tangential impulse. The ratios are from direct simulations of the Boltzmann equation with
-# 10^5 disks and have errors of 0.002.
+# Steady temperature ratio T_rot / T of cooling rough disks, by normal and tangential restitution
+# (xi, beta), for the moment of inertia m r^2 / 2 and no Coulomb limit of the tangential impulse.
+# From direct simulations of the Boltzmann equation with 10^5 disks; the errors are 0.002.
 ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055, (0.85, 0.3): 0.708}
 
 
 def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, float]:
     """Return A, B and C of dT/ds = -2 (A T - B R) and dR/ds = 4 (B T - C R) for rough disks.
 
-    T = m <v^2> / 2 and R = I <omega^2> are the temperatures, s the collisions per disk, and
-    `inertia` is I / m r^2. For Maxwell's distribution, from Luding, Huthmann, McNamara and
-    Zippelius, Physical Review E 57, 3416 (1998).
+    T = m <v^2> / 2 and R = I <omega^2> are the temperatures, s is the number of collisions per
+    disk, and `inertia` is I / m r^2. The coefficients are those of Luding, Huthmann, McNamara and
+    Zippelius, Physical Review E 57, 3416 (1998), for Maxwellian velocities.
     """
     eta = inertia * (1 + beta) / (2 * inertia + 2)
     a = (1 - xi**2) / 4 + eta * (1 - eta) / 2
@@ -155,10 +152,10 @@ def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, f
 
 
 def rough_ratio(xi: float, beta: float, inertia: float) -> float:
-    """Return the limit of the ratio R / T of the two temperatures of cooling rough disks.
+    """Return the limit of the temperature ratio R / T of cooling rough disks.
 
     The theory is that of Luding, Huthmann, McNamara and Zippelius, Physical Review E 57, 3416
-    (1998), for Maxwell's distribution.
+    (1998), for Maxwellian velocities.
 
     Parameters
     ----------
@@ -184,9 +181,9 @@ def rough_ratio(xi: float, beta: float, inertia: float) -> float:
 def rough_temperatures(
     tau: np.ndarray, start: tuple[float, float], xi: float, beta: float, inertia: float
 ) -> np.ndarray:
-    """Return both temperatures (2, T) of cooling rough disks at tau (T,) collisions per disk.
+    """Return both temperatures (2, T) of cooling rough disks after tau (T,) collisions per disk.
 
-    `start` contains the initial translational and rotational temperature; theory as of
+    `start` holds the initial translational and rotational temperature; the theory is that of
     `rough_ratio`.
     """
     a, b, c = rough_rates(xi, beta, inertia)
@@ -198,12 +195,12 @@ def rough_temperatures(
 def pushed_width(
     widths: np.ndarray, places: np.ndarray, squares: int, energy: np.ndarray
 ) -> tuple[float, float]:
-    """Return mean and variance of the width of a box with a piston under a constant force.
+    """Return mean and variance of the width of a box closed by a piston under a constant force.
 
-    The probability density of the width w is proportional to Q(w) (H - F w)^(f/2 - 1), as derived
-    in docs/explanation/theory.md, with the number of degrees of freedom f, `squares`. At equally
-    spaced `widths` (W,), `places` is ln Q of the configuration integral, NaN where it is unknown,
-    and `energy` is H - F w.
+    The probability density of the width w is proportional to Q(w) (H - F w)^(f/2 - 1), where f is
+    the number of degrees of freedom, `squares` (docs/explanation/theory.md). At equally spaced
+    `widths` (W,), `places` is ln Q of the configuration integral, NaN where unknown, and `energy`
+    is H - F w.
     """
     log = np.where(np.isnan(places), -np.inf, places) + (squares / 2 - 1) * np.log(energy)
     density = np.exp(log - log.max())
@@ -214,24 +211,26 @@ def pushed_width(
 def demon_share(climb: float, layers: float, xi: float) -> float:
     """Return the fraction of a dilute gas in the fuller of two chambers above a vibrating floor.
 
-    The fluxes through a hole at the height h, n^2 exp(-m g h / T), are equal (Eggers, Physical
-    Review Letters 83, 5322 (1999)). T balances the power n m g V of a sawtooth motion with the
-    velocity V and the dissipation n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w of n disks of
-    diameter s in a chamber of width w: T/m = (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.
+    The chambers are connected by a hole at height h. In the steady state the fluxes through it in
+    both directions, proportional to n^2 exp(-m g h / T), are equal (Eggers, Physical Review Letters
+    83, 5322 (1999)). T follows from an energy balance in a chamber of width w with n disks of
+    diameter s: the power n m g V of a floor with a sawtooth motion of velocity V equals the
+    dissipation rate n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w, so that T/m = (2 V w / (n s
+    sqrt(pi) (1 - xi^2)))^2.
 
     Parameters
     ----------
     climb : float
         g h / V^2
     layers : float
-        N s / w, with N disks in both chambers
+        N s / w, where N is the number of disks in both chambers
     xi : float
-        restitution, below 1
+        coefficient of restitution, below 1
 
     Returns
     -------
     float
-        fraction in the fuller chamber; 1/2 where the equal state is stable, m g h < T
+        fraction in the fuller chamber; 1/2 where the equal distribution is stable, m g h < T
 
     Examples
     --------
@@ -240,9 +239,10 @@ def demon_share(climb: float, layers: float, xi: float) -> float:
     >>> theory.demon_share(20.0, 2.0, 0.8) > 0.9
     True
     """
-    steep = climb * np.pi * (layers * (1 - xi**2) / 2) ** 2  # m g h / T of all disks in one chamber
+    # m g h / T if all disks were in one chamber
+    steep = climb * np.pi * (layers * (1 - xi**2) / 2) ** 2
 
-    def excess(odds: float) -> float:  # logarithm of the ratio of both fractions
+    def excess(odds: float) -> float:  # logarithm of the ratio of the two fractions
         return odds - steep / 2 * np.tanh(odds / 2)
 
     if steep <= 4:

@@ -8,7 +8,7 @@ from .hard_disks import henderson, of_sizes
 
 __all__ = ["virial_pressure"]
 
-ROUNDS = 100  # of the iteration for the densities far from the walls
+ROUNDS = 100  # iterations for the densities far from the walls
 
 
 def virial_pressure(
@@ -16,16 +16,19 @@ def virial_pressure(
 ) -> float:
     """Return the observable `virial_pressure` / kT [1/length^2] of a fluid in a rectangular box.
 
-    It is (F_x L_x + F_y L_y) / (2 A kT): force on a side times mean distance of centres at opposite
-    sides, for disks of S species, with numbers and radii (S,), in a box with `edges` (2,), of which
-    `walls` (2,) are not periodic. Wall tension and deficit are those of Helfand, Frisch and
-    Lebowitz, Journal of Chemical Physics 34, 1037 (1961), extended to mixtures; the bulk pressure
-    is Henderson's, and `of_sizes` for mixtures. NaN if the box is too small for a fluid.
+    It is (F_x L_x + F_y L_y) / (2 A kT), where F is the force on a side and L the mean distance
+    between the centres of disks touching opposite sides. The fluid consists of S species with
+    numbers and radii (S,); the box has the lengths `edges` (2,), and `walls` (2,) marks the axes
+    that are not periodic. The tension of the walls and the disks missing beside them follow from
+    Helfand, Frisch and Lebowitz, Journal of Chemical Physics 34, 1037 (1961), extended to mixtures;
+    the bulk pressure is that of Henderson, with `of_sizes` for mixtures. The result is NaN if the
+    box is too small for a fluid.
     """
     count, radius, edges, walls = (
         np.asarray(x, dtype=float) for x in (count, radius, edges, walls)
     )
-    area, length = np.prod(edges), 2 * walls @ edges[::-1]  # of the box, and of all its walls
+    # area of the box, and total length of its walls
+    area, length = np.prod(edges), 2 * walls @ edges[::-1]
     density = count / area
     for _ in range(ROUNDS if length else 0):
         if math.pi * density @ radius**2 >= 1:
@@ -44,10 +47,10 @@ def virial_pressure(
 
 
 def deficit(density: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Return the deficit of disks of each species (S,) at a wall, per length of the wall.
+    """Return the number of disks of each species (S,) missing beside a wall, per length.
 
     By Gibbs' adsorption equation it is the derivative of the tension with respect to the chemical
-    potentials, both from the free energy of scaled particle theory.
+    potentials, both taken from the free energy of scaled particle theory.
     """
     own = math.pi * radius**2
     free, total, sizes = 1 - density @ own, density.sum(), density @ radius
@@ -56,6 +59,6 @@ def deficit(density: np.ndarray, radius: np.ndarray) -> np.ndarray:
     mixed = np.outer(own, 2 * math.pi * sizes * radius / free**2)
     areas = np.outer(own, own) * (total / free**2 + 2 * math.pi * sizes**2 / free**3)
     potentials = np.add.outer(own, own) / free + lengths + mixed + mixed.T + areas
-    # The derivatives of the chemical potentials are multiplied by the densities, so that the matrix
-    # is regular even if a species has no disks.
+    # Multiplying the derivatives of the chemical potentials by the densities keeps the matrix
+    # regular even if a species has no disks.
     return np.linalg.solve(np.eye(len(own)) + density[:, None] * potentials, density * slope)
