@@ -1,1 +1,1 @@
-"""Modules that read output files, determine traits of runs, and convert runs to other types."""
+"""Read output files, determine the traits of runs, and convert runs to other types."""

@@ -1,18 +1,18 @@
-"""Types of the arrays and indices that functions of this package accept and return."""
+"""Types of arrays and indices used by the functions of this package."""
 
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 
-#: Index that selects frames (number, slice or list); negative numbers count from the last frame.
+#: Selection of frames: an integer, a slice or a list. Negative integers count from the last frame.
 Index = int | slice | Sequence[int] | np.ndarray
-#: Argument of a formula: a number or an array of numbers.
+#: Argument of a formula: a number or an array.
 Number = TypeVar("Number", float, np.ndarray)
 
 
 def as_index(index: Index) -> int | slice | np.ndarray:
-    """Convert a number, slice, list, tuple or range to an index that NumPy accepts for one axis."""
+    """Convert an integer, slice, list, tuple or range to an index of one axis of an array."""
     if isinstance(index, int | np.integer | slice):
         return index if isinstance(index, slice) else int(index)
     array = np.asarray(index)
@@ -20,7 +20,7 @@ def as_index(index: Index) -> int | slice | np.ndarray:
 
 
 def chosen(count: int, index: Index) -> list[int]:
-    """Return the positions, counted from 0, that an index selects in a list of `count` items."""
+    """Return the indices, from 0 to `count` - 1, of the items that an index selects."""
     found: list[int] = np.atleast_1d(np.arange(count)[as_index(index)]).tolist()
     return found
 
@@ -40,8 +40,9 @@ def in_place(function: np.ufunc, name: str) -> Any:
 class Snapshot(np.ndarray):
     """Read-only copy of an array of a simulation, such as the velocities at one time.
 
-    In-place operators return a new array, so that `box.velocity *= 2` sets the velocities of the
-    simulation as `box.velocity = box.velocity * 2` does. Other expressions return ordinary arrays.
+    In-place operators return a new array, so that `box.velocity *= 2` is equivalent to
+    `box.velocity = box.velocity * 2` and sets the velocities of the simulation. Other expressions
+    return ordinary arrays.
     """
 
     __iadd__ = in_place(np.add, "__iadd__")
@@ -58,7 +59,7 @@ class Snapshot(np.ndarray):
         return array[()] if return_scalar else np.asarray(array)
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        """Raise an error, because assigning to a read-only copy would not change the simulation."""
+        """Raise an error, because assignment to this copy would not change the simulation."""
         if not self.flags.writeable:
             raise ValueError(
                 "read-only: this array is a copy of the simulation's; change a copy of it, and "

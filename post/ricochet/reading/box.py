@@ -1,4 +1,4 @@
-"""Properties of the box of a run: sides, which may move, accessible area, obstacles, walls."""
+"""The box of a run: its sides, which may move, its accessible area, obstacles and walls."""
 
 from collections.abc import Iterable, Mapping
 from functools import cached_property
@@ -13,12 +13,12 @@ from .results import SIDES, Results
 DRIFTING = (
     "constant_velocity",
     "piston",
-)  # motions of a side that change the area of the box permanently
+)  # motions of a side that change the area of the box for good
 MOVED = ("motion", "velocity", "start_time", "end_time", "amplitude", "period", "phase")
 
 
 class BoxResults(Results):
-    """The results of one run, including the positions of the sides of its box."""
+    """Results of one run, including the positions of the sides of the box."""
 
     @property
     def upper(self) -> np.ndarray:
@@ -27,7 +27,7 @@ class BoxResults(Results):
 
     @property
     def changes(self) -> list[Change]:
-        """Time, name of the variable, and new value of each change during the run."""
+        """Changes of variables during the run, with time, name and new value."""
         return changes_in(self.parameters.get("changes", ""))
 
     @property
@@ -38,8 +38,8 @@ class BoxResults(Results):
     def corners_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the corners of the box, whose sides may move, at the given times.
 
-        The positions of pistons, and of sides whose motion changes, are interpolated between
-        samples.
+        Positions of pistons, and of sides whose motion is changed during the run, are interpolated
+        between samples.
 
         Parameters
         ----------
@@ -76,7 +76,7 @@ class BoxResults(Results):
         Returns
         -------
         numpy.ndarray
-            (..., 4) True for each side that is open, in the order left, right, bottom, top
+            (..., 4) True for each open side, in the order left, right, bottom, top
 
         Examples
         --------
@@ -94,14 +94,14 @@ class BoxResults(Results):
 
     @property
     def _offsets(self) -> np.ndarray:
-        """Inward distance of each side (4,) from the corresponding edge of the box at the start."""
+        """Inward displacement (4,) of each side from the edge of the box at the start."""
         ends = [end[axis] for axis in (0, 1) for end in (self.lower, self.upper)]
         starts = [side.get("position", end) for side, end in zip(self.sides, ends, strict=True)]
         return (np.array(starts, dtype=float) - ends) * [1, -1, 1, -1]
 
     @cached_property
     def piston_positions(self) -> dict[int, Series]:
-        """Time series of the position of each piston or changed side, by its index in `sides`."""
+        """Position in time of each piston and each changed side, by its index in `sides`."""
         names = (change.name.split(".") for change in self.changes)
         new = {name[1] for name in names if name[0] == "side" and name[-1] in MOVED}
         free = [
@@ -114,7 +114,7 @@ class BoxResults(Results):
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower left and upper right corner of the area covered by the box during the run."""
+        """Lower left and upper right corner of the region that the box covers during the run."""
         swings = np.array([outmost(side) for side in self.sides])
         swings = np.maximum(0.0, swings - self._offsets)
         for k, place in self.piston_positions.items():
@@ -125,13 +125,13 @@ class BoxResults(Results):
     def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
         """Return the area of the box minus that of its obstacles, or the area of a round container.
 
-        Walls and arcs have no area, also if they enclose a region. Oscillating sides are at their
-        mean positions, as in the pressure written by the program.
+        Walls and arcs have no area, even if they enclose a region. Oscillating sides count at their
+        mean positions, as in the pressure that the program writes.
 
         Parameters
         ----------
         time : float or numpy.ndarray
-            (...) times, which matter for pistons and sides of constant velocity
+            (...) times, which matter only if sides move
 
         Returns
         -------
@@ -157,7 +157,7 @@ class BoxResults(Results):
 
 
 def passages(observables: Iterable[str]) -> dict[str, list[str]]:
-    """Return the names of the observables that count disks which left or entered an open system."""
+    """Return the observables that count the disks leaving or entering an open system."""
     names = list(observables)
     return {
         "left": [name for name in names if name.startswith("sides/") and name.endswith("/left")],
@@ -166,10 +166,7 @@ def passages(observables: Iterable[str]) -> dict[str, list[str]]:
 
 
 def outmost(side: Mapping[str, Any]) -> float:
-    """Return the largest outward displacement of a side during the run [length].
-
-    It is measured as in `displaced`.
-    """
+    """Return the largest outward displacement (see `displaced`) of a side during the run."""
     if side.get("motion") == "constant_velocity":
         return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
     return float(side["amplitude"]) if side.get("motion") in ("sine", "parabolic") else 0.0
@@ -178,8 +175,8 @@ def outmost(side: Mapping[str, Any]) -> float:
 def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
     """Return the inward displacement of a moving side at times (docs/explanation/theory.md).
 
-    It is measured from the mean position of an oscillating side, or from the initial position of a
-    side that moves at constant velocity.
+    It is relative to the mean position of an oscillating side, or to the initial position of a side
+    moving at constant velocity.
     """
     if side.get("motion") == "constant_velocity":
         start, end = side["start_time"], side["end_time"]
@@ -193,7 +190,7 @@ def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
 
 
 def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
-    """Return all circular obstacles and arcs, in the order of the event log."""
+    """Return all circular obstacles and arcs in the order of their boundary ids."""
     groups = parameters.get("obstacle", {})
     if "inside" not in groups:
         return ()
@@ -208,13 +205,13 @@ def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
 
 
 def walls_of(parameters: Mapping[str, Any], group: str = "wall") -> np.ndarray:
-    """Return the end points (W, 2, 2) of the W straight walls, in the order of the event log."""
+    """Return the end points (W, 2, 2) of the straight walls in the order of their boundary ids."""
     rows = parameters.get(f"{group}_rows", parameters.get(group))
     return np.stack([rows["from"], rows["to"]], axis=1) if rows else np.empty((0, 2, 2))
 
 
 def groups_of_rows(parameters: Mapping[str, Any], name: str) -> np.ndarray:
-    """Return for each obstacle the index (W,) of its `&obstacle` group in the input file."""
+    """Return the index of the `&obstacle` group of each obstacle (W,) in the input file."""
     rows = parameters.get(f"{name}_rows")
     if rows:
         return np.asarray(rows["group"]) - 1

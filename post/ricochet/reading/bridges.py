@@ -1,6 +1,6 @@
-"""Exchange of disks with other programs: MDAnalysis, GSD files and LAMMPS dump files.
+"""Exchange of data with other programs: MDAnalysis, GSD files and LAMMPS dump files.
 
-The methods `Run.to_dataframe` and `Run.to_xarray` convert runs for pandas and xarray.
+For pandas and xarray see the methods `Run.to_dataframe` and `Run.to_xarray`.
 """
 
 from collections.abc import Iterator
@@ -27,24 +27,24 @@ __all__ = [
     "write_lammps",
 ]
 
-TOLERANCE = 1e-6  # largest |z| of a two-dimensional system, relative to the largest edge
-CLOSED = "ff"  # word of a LAMMPS dump for an axis with walls
-#: Columns of a LAMMPS dump that have other names in Ricochet.
+TOLERANCE = 1e-6  # largest |z| in a two-dimensional system, relative to the longest edge of the box
+CLOSED = "ff"  # keyword of a LAMMPS dump for an axis bounded by walls
+#: Columns of a LAMMPS dump that are named differently in Ricochet.
 NAMES = {"angular_velocity": "omegaz"}
-#: Items of a LAMMPS dump file whose first line continues after the name of the item.
+#: Items of a LAMMPS dump file that have further words on their first line.
 ITEMS = ("ATOMS", "BOX BOUNDS")
-#: Columns of a LAMMPS dump that are read and that contain numbers.
+#: Numeric columns of a LAMMPS dump that are read.
 NUMBERS = {f"{axis}{end}" for axis in "xyz" for end in ("", "u", "s", "su")}
 NUMBERS |= {"vx", "vy", "radius", "diameter", "mass", "omegaz", "orientation"}
-#: For each item of a frame: the rest of its first line, and the words of its other lines.
+#: The items of a frame: the remaining words of the first line, and the words of the other lines.
 Items = dict[str, tuple[list[str], list[list[str]]]]
 
 
 def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
     """Convert a run to a `Universe` of the package MDAnalysis, which must be installed.
 
-    All disks have z = 0, and lengths and times keep their values. The type of an atom is the name
-    of its species. MDAnalysis assumes equally spaced frames; their interval is set to the mean.
+    All disks have z = 0; lengths and times keep their values. The type of an atom is the name of
+    its species. MDAnalysis assumes equally spaced frames, so the interval is set to the mean.
 
     Parameters
     ----------
@@ -75,16 +75,16 @@ def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
 
 
 class ImportedFrame(NamedTuple):
-    """State of disks at one time, read from the file of another program.
+    """State of disks at one time, read from a file of another program.
 
-    `disks` contains the keyword arguments of `ricochet.write_start`: "position" and "velocity" (N,
-    2), "radius", "mass", "angular_velocity" and "orientation" (N,), if they are in the file, and
-    the names "species" (N,).
+    `disks` holds keyword arguments for `ricochet.write_start`: "position" and "velocity" (N, 2);
+    "radius", "mass", "angular_velocity" and "orientation" (N,), as far as the file contains them;
+    and "species", the names (N,).
     """
 
     time: float
-    lower: np.ndarray  # (2,) corner of the box
-    upper: np.ndarray  # (2,)
+    lower: np.ndarray  # (2,) lower left corner of the box
+    upper: np.ndarray  # (2,) upper right corner of the box
     periodic: np.ndarray  # (2,) bool
     disks: dict[str, np.ndarray]
 
@@ -115,7 +115,7 @@ class ImportedFrame(NamedTuple):
 
 
 def refuse_sheared(run: Run, kind: str) -> None:
-    """Raise Refused if the box of a run is not a rectangle that is repeated periodically."""
+    """Raise Refused if the box of a run is sheared."""
     if run.shear_rate:
         why = "the copies of a sheared box are displaced, and"
         raise Refused(f"{run.path}: {why} {kind} files are written of rectangular boxes only")
@@ -129,9 +129,10 @@ def write_gsd(
 ) -> Path:
     """Write frames to a GSD file in the schema of HOOMD-blue; the package gsd must be installed.
 
-    The file is for freud, OVITO and HOOMD-blue. The format places the origin at the centre of the
-    box, stores its edges in single precision, and has no walls. The quantities "ricochet/time",
-    "ricochet/lower", "ricochet/upper" and "ricochet/periodic" are logged in addition.
+    The file can be read by freud, OVITO and HOOMD-blue. In this format the origin is at the centre
+    of the box, the edges of the box are stored in single precision, and there are no walls. The
+    quantities "ricochet/time", "ricochet/lower", "ricochet/upper" and "ricochet/periodic" are
+    logged as well.
 
     Parameters
     ----------
@@ -140,14 +141,14 @@ def write_gsd(
     path : str or Path
         the file to write
     frames : int, slice or list of int, optional
-        frames of the run, whose numbers are the steps [all]
+        frames of the run, whose indices become the time steps [all]
     precision : {"double", "single"}
-        precision of real numbers; in single precision nearly touching disks may overlap
+        precision of real numbers; in single precision disks that nearly touch may overlap
 
     Returns
     -------
     Path
-        the path of the file
+        path of the file
 
     Raises
     ------
@@ -195,35 +196,36 @@ def gsd_frame(package: Any, run: Run, frame: int) -> Any:
 
 
 def in_space(flat: np.ndarray) -> np.ndarray:
-    """Return vectors (N, 3) with z = 0."""
+    """Append z = 0 to vectors (N, 2)."""
     return np.pad(flat, ((0, 0), (0, 1)))
 
 
 def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
     """Read a frame of a GSD file; the package gsd must be installed.
 
-    In files not written by `write_gsd`, the axes are periodic, the origin is at the centre of the
-    box, and the time is the step of the frame. If positions were written in single precision,
-    touching disks can overlap by rounding, which Ricochet refuses: multiply the radii by 1 - 1e-6.
+    For a file not written by `write_gsd`, both axes are taken to be periodic, the origin to be at
+    the centre of the box, and the time to be the time step of the frame. If positions were written
+    in single precision, touching disks may overlap by rounding errors, which Ricochet refuses; in
+    this case multiply the radii by 1 - 1e-6.
 
     Parameters
     ----------
     path : str or Path
         a GSD file in the schema of HOOMD-blue, in two dimensions
     frame : int
-        number of the frame, from 0, or from the end if negative
+        index of the frame, counted from the end if negative
 
     Returns
     -------
     ImportedFrame
-        the disks, and the box
+        the disks and the box
 
     Raises
     ------
     ImportError
         if gsd is not installed
     RunError
-        if the file is not a GSD file of disks in a rectangle, or is damaged
+        if the file is damaged, or not a GSD file of disks in a rectangle
 
     Examples
     --------
@@ -249,12 +251,12 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
 
 
 def in_words(problem: BaseException) -> str:
-    """Return the message of an exception in one line; some exceptions have only a name."""
+    """Return the message of an exception on one line, or its type if it has no message."""
     return " ".join(str(problem).split()) or type(problem).__name__
 
 
 def imported_gsd(where: str, found: Any) -> ImportedFrame:
-    """Return the disks of a frame of the package gsd; `where` names the file and the frame."""
+    """Return the disks in a frame of the package gsd; `where` names file and frame in messages."""
     box, particles, log = found.configuration.box, found.particles, found.log
     width, height, *_, xy, xz, yz = box.tolist()
     if any((xy, xz, yz)):
@@ -276,7 +278,7 @@ def imported_gsd(where: str, found: Any) -> ImportedFrame:
 
 
 def gsd_diameters(particles: Any) -> np.ndarray:
-    """Return the diameters (N,) of the disks, which a file may list per particle type."""
+    """Return the diameters (N,) of the disks, which a file may also list by particle type."""
     shapes = [(one or {}).get("diameter") for one in particles.type_shapes or []]
     if len(shapes) == len(particles.types) and all(shapes):
         return np.array(shapes, dtype=float)[particles.typeid]
@@ -298,7 +300,7 @@ def checked(
     periodic: np.ndarray,
     disks: dict[str, np.ndarray],
 ) -> ImportedFrame:
-    """Return a frame whose disks are in the box; raise ValueError if its numbers are impossible."""
+    """Return a frame with disks wrapped into the box; raise ValueError for impossible values."""
     numbers = {name: values for name, values in disks.items() if name != "species"}
     own = {"time": np.array(time), "lower": lower, "upper": upper, "periodic": periodic}
     check_values(own | numbers)
@@ -309,10 +311,11 @@ def checked(
 def wrapped(
     position: np.ndarray, lower: np.ndarray, edges: np.ndarray, periodic: np.ndarray
 ) -> np.ndarray:
-    """Return positions (N, 2), moved into the box by whole periods along the periodic axes."""
+    """Return positions (N, 2), shifted into the box by whole periods along the periodic axes."""
     outside = (position < lower) | (position >= lower + edges)
     inside = lower + (position - lower) % edges
-    inside = np.where(inside < lower + edges, inside, lower)  # the rounding of % can return `edges`
+    # the operator % may round up to `edges`
+    inside = np.where(inside < lower + edges, inside, lower)
     return np.where(outside & periodic, inside, position)
 
 
@@ -322,11 +325,11 @@ def wrapped(
 def write_lammps(
     run: Run, path: str | Path, frames: Index | None = None, time: bool = True
 ) -> Path:
-    """Write frames to a text file in the format of the command `dump custom` of LAMMPS.
+    """Write frames to a text file in the format of the LAMMPS command `dump custom`.
 
-    The columns are id, type, element (the name of the species), x, y, z, vx, vy, vz, radius, mass,
-    for a periodic box also ix, iy, iz, and for disks that can rotate omegaz and orientation, with
-    full precision. The time step of a frame is its number in the run.
+    The columns are id, type, element (the name of the species), x, y, z, vx, vy, vz, radius and
+    mass, with ix, iy, iz for a periodic box, and omegaz and orientation for disks that can rotate.
+    Numbers are written with full precision. The time step of a frame is its index in the run.
 
     Parameters
     ----------
@@ -337,12 +340,12 @@ def write_lammps(
     frames : int, slice or list of int, optional
         frames of the run [all]
     time : bool
-        whether to write the item TIME, as `dump_modify time yes` does; MDAnalysis cannot read it
+        write the item TIME, like `dump_modify time yes`, which MDAnalysis cannot read
 
     Returns
     -------
     Path
-        the path of the file
+        path of the file
 
     Raises
     ------
@@ -364,7 +367,7 @@ def write_lammps(
 
 
 def lammps_frame(run: Run, frame: int, time: bool) -> str:
-    """Convert a frame of a run to the lines of a LAMMPS dump file."""
+    """Return the text of a frame of a run in a LAMMPS dump file."""
     lower, upper = run.corners_at(run.time[frame])
     sides = np.array([[*lower, -0.5], [*upper, 0.5]]).T.tolist()
     disks, inside = run[frame], run.in_box(frame)
@@ -391,28 +394,28 @@ def lammps_frame(run: Run, frame: int, time: bool) -> str:
 
 
 def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
-    """Read a frame of a text file of the command `dump` of LAMMPS.
+    """Read a frame of a text file written by the LAMMPS command `dump`.
 
-    Positions must be x and y, xu and yu (unwrapped), or xs and ys (scaled). The columns id, element
-    or type (which name the species), vx, vy, radius or diameter, mass, omegaz and orientation are
-    optional. The time is that of the item TIME or, without it, the time step.
+    Positions must be given as x and y, as xu and yu (unwrapped) or as xs and ys (scaled). Optional
+    columns are id, element or type (the name of the species), vx, vy, radius or diameter, mass,
+    omegaz and orientation. The time is that of the item TIME or, if this is missing, the time step.
 
     Parameters
     ----------
     path : str or Path
         the dump file
     frame : int
-        number of the frame, from 0, or from the end if negative
+        index of the frame, counted from the end if negative
 
     Returns
     -------
     ImportedFrame
-        the disks, and the box
+        the disks and the box
 
     Raises
     ------
     RunError
-        if the file is no such file or is damaged, or its particles are not in a rectangle
+        if the file is damaged or not a dump file, or if its particles are not in a rectangle
 
     Examples
     --------
@@ -444,9 +447,9 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
 
 
 def frame_starts(file: BinaryIO) -> Iterator[int]:
-    """Yield the positions in a dump file, in bytes, at which frames start.
+    """Yield the positions in a dump file, in bytes, at which frames begin.
 
-    A frame starts with its time step, or with the units and the time that precede it.
+    A frame begins with its time step, or with the units and the time that precede it.
     """
     place, before = 0, False
     while line := file.readline():
@@ -459,7 +462,7 @@ def frame_starts(file: BinaryIO) -> Iterator[int]:
 
 
 def items_of(file: BinaryIO) -> Items:
-    """Read the items of one frame, which starts at the present position of an open dump file."""
+    """Read the items of one frame from the current position in an open dump file."""
     items: Items = {}
     for line in map(bytes.decode, file):
         if not line.startswith("ITEM:"):
@@ -473,7 +476,7 @@ def items_of(file: BinaryIO) -> Items:
 
 
 def imported(where: str, items: Items) -> ImportedFrame:
-    """Return the disks of a frame of a dump file; `where` names the file and the frame."""
+    """Return the disks in a frame of a dump file; `where` names file and frame in messages."""
     kinds, bounds = items["BOX BOUNDS"]
     if len(kinds) != 3:
         raise RunError(f"{where}: its box is tilted; only rectangular boxes can be read")

@@ -1,7 +1,7 @@
 """Contact networks and force chains from the event log of a run.
 
-In an event-driven simulation a force is the momentum transferred by collisions per unit of time:
-the mean force between two disks in a window of time is the sum of their impulses over its length.
+In an event-driven simulation the mean force between two disks during a time window is the sum of
+the impulses they exchange in collisions, divided by the length of the window.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -19,44 +19,44 @@ __all__ = ["ContactNetwork", "chains", "network"]
 
 
 class ContactNetwork(NamedTuple):
-    """Contacts of disks with each other and with boundaries, from collisions in a window of time.
+    """Contacts between disks, and of disks with boundaries, from the collisions in a time window.
 
-    All arrays have a row for each of the E contacts. As in `EventLog`, a positive `j` is the id of
-    a disk (larger than `i`), and 0, -1, -2, ... are boundary ids.
+    All arrays have one row for each of the E contacts. As in `EventLog`, a positive `j` is the id
+    of another disk (larger than `i`); 0, -1, -2, ... are boundary ids.
     """
 
-    i: np.ndarray  # (E,) id of a disk, counted from 1
+    i: np.ndarray  # (E,) id of the first disk, counted from 1
     j: np.ndarray  # (E,)
     contacts: np.ndarray  # (E,) number of collisions
-    impulse: np.ndarray  # (E,) sum of the magnitudes of the momentum changes
+    impulse: np.ndarray  # (E,) sum of the magnitudes of all momentum changes
     momentum: np.ndarray  # (E, 2) sum of the momentum changes of disk i
-    start: float  # of the window; a collision at exactly this time is excluded
-    end: float  # of the window; a collision at exactly this time is included
+    start: float  # of the window, itself excluded
+    end: float  # of the window, itself included
 
     @property
     def force(self) -> np.ndarray:
-        """Mean force (E,) of each contact: its impulse divided by the length of the window."""
+        """Mean force (E,) of each contact, its impulse divided by the length of the window."""
         return self.impulse / (self.end - self.start)
 
     @property
     def pairs(self) -> np.ndarray:
-        """Mask (E,) that is true for contacts of two disks, false for contacts with boundaries."""
+        """Mask (E,) that is True for contacts between disks, False for contacts with boundaries."""
         return self.j > 0
 
     def matrix(self, n_disks: int, quantity: str = "impulse") -> "scipy.sparse.csr_array":
-        """Return a quantity of the contacts of two disks as a symmetric sparse matrix.
+        """Return a quantity of the contacts between disks as a symmetric sparse matrix.
 
         Parameters
         ----------
         n_disks : int
-            number N of disks of the run
+            number N of disks in the run
         quantity : {"impulse", "contacts", "force"}
-            quantity of the contacts
+            quantity to return
 
         Returns
         -------
         scipy.sparse.csr_array
-            (N, N) matrix, whose row k belongs to the disk with the id k + 1
+            (N, N) matrix, where row k belongs to the disk with the id k + 1
 
         Examples
         --------
@@ -96,24 +96,24 @@ class ContactNetwork(NamedTuple):
 
 
 def network(run: Run, start: float | None = None, end: float | None = None) -> ContactNetwork:
-    """Return the contacts in the window of time start < t <= end from the event log.
+    """Return the contacts in the time window start < t <= end from the event log.
 
     Parameters
     ----------
     run : ricochet.Run
         a run with `output.event_log = .true.`
     start, end : float, optional
-        the window of time [the whole run]
+        ends of the time window [the whole run]
 
     Returns
     -------
     ContactNetwork
-        a row for each pair of disks, or disk and boundary, that collided in the window
+        one row for each pair of disks, or of disk and boundary, that collided in the window
 
     Raises
     ------
     RunError
-        if the run has no event log, or the window does not lie in the run
+        if the run has no event log, or does not cover the window
 
     Examples
     --------
@@ -140,25 +140,25 @@ def network(run: Run, start: float | None = None, end: float | None = None) -> C
 
 
 def chains(found: ContactNetwork, above: float = 1.0, at_least: int = 3) -> list[np.ndarray]:
-    """Return the force chains: groups of disks connected by strong contacts.
+    """Return the force chains, groups of disks connected by strong contacts.
 
-    A contact is strong if its impulse exceeds `above` times the mean of all contacts between disks;
-    such contacts bear the deviatoric load of a granular medium (Radjai and others, Physical Review
-    Letters 80, 61 (1998)).
+    A contact is strong if its impulse exceeds `above` times the mean over all contacts between
+    disks. Such contacts carry the deviatoric load of a granular medium (Radjai and others, Physical
+    Review Letters 80, 61 (1998)).
 
     Parameters
     ----------
     found : ricochet.contacts.ContactNetwork
-        the contacts in a window of time
+        contacts in a time window
     above : float
-        smallest impulse of a strong contact over the mean impulse
+        threshold of a strong contact, relative to the mean impulse
     at_least : int
-        fewest disks of a chain
+        fewest disks in a chain
 
     Returns
     -------
     list of numpy.ndarray
-        ids of the disks of each chain, in increasing order, the largest chain first
+        for each chain, the largest first, the ids of its disks in increasing order
 
     Examples
     --------
@@ -177,7 +177,7 @@ def chains(found: ContactNetwork, above: float = 1.0, at_least: int = 3) -> list
 
 
 def strong_contacts(found: ContactNetwork, above: float = 1.0) -> np.ndarray:
-    """Return a mask (E,) of the strong contacts between disks, as `chains` defines them."""
+    """Return a mask (E,) of the strong contacts between disks (see `chains`)."""
     pairs = found.pairs
     mean = found.impulse[pairs].mean() if pairs.any() else 0.0
     return pairs & (found.impulse > above * mean)

@@ -15,24 +15,24 @@ from typing import Any
 import h5py
 import numpy as np
 
-PRIORITY = 10  # order in which folders are removed among the actions at the end of a process
+PRIORITY = 10  # priority of removing folders among the actions at the end of a process
 
 
 class RunError(Exception):
-    """Error raised for a file that cannot be used; the message contains its path and the reason."""
+    """Error for an unusable file, with a message that names its path and the reason."""
 
 
 class Unsound(Exception):
-    """Error raised for invalid contents of a file; `open_file` adds its path to the message."""
+    """Error for invalid contents of a file, to whose message `open_file` adds the path."""
 
 
 def installing(package: str) -> str:
-    """Return the command that installs a package in the environment of the running Python."""
+    """Return the command that installs a package for the running Python."""
     return f"{sys.executable} -m pip install {package}"
 
 
 def optional_package(module: str, user: str) -> Any:
-    """Import an optional module, or raise an ImportError that explains how to install it."""
+    """Import an optional module, or raise an ImportError that says how to install it."""
     try:
         return import_module(module)
     except ImportError:
@@ -42,7 +42,7 @@ def optional_package(module: str, user: str) -> Any:
 
 @contextmanager
 def open_file(path: Path) -> Iterator[h5py.File]:
-    """Open an HDF5 file for reading; raise RunError if its contents cannot be used."""
+    """Open an HDF5 file for reading; raise RunError if its contents are unusable."""
     with hdf5_file(path) as file:
         try:
             yield file
@@ -55,7 +55,7 @@ def open_file(path: Path) -> Iterator[h5py.File]:
 
 
 def hdf5_file(path: Path) -> h5py.File:
-    """Open an HDF5 file for reading, also while a simulation is writing it."""
+    """Open an HDF5 file for reading, even while a simulation is writing to it."""
     if not path.exists():
         part = Path(f"{path}.part")
         hint = f", but there is {part} of an unfinished run" if part.exists() else None
@@ -71,14 +71,14 @@ def hdf5_file(path: Path) -> h5py.File:
         if "locking flag" in str(problem) or "already open" in str(problem):
             why = "this process has opened it with another mode or lock; close it there first"
             raise RunError(f"{path}: {why}") from None
-        if not path.exists():  # the file has just been removed, or renamed by the program
+        if not path.exists():  # just removed, or renamed by the program
             raise RunError(f"{path}: no such file") from None
         state = "is empty" if path.stat().st_size == 0 else "is not an HDF5 file, or is cut short"
         raise RunError(f"{path}: {state}") from None
 
 
 def did_you_mean(word: str, others: Iterable[str]) -> str:
-    """Return a question that suggests the most similar word, or an empty string."""
+    """Return a question that suggests the most similar word, or '' if there is none."""
     return "".join(f"; did you mean {near}?" for near in get_close_matches(word, others, 1))
 
 
@@ -91,7 +91,7 @@ def tree(group: h5py.Group) -> dict[str, Any]:
 
 
 def plain(value: object) -> object:
-    """Convert bytes to text, and NumPy scalars to numbers of Python."""
+    """Convert bytes to strings, and NumPy scalars to Python numbers."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace").rstrip()
     if isinstance(value, np.ndarray) and value.dtype.kind == "S":
@@ -100,9 +100,10 @@ def plain(value: object) -> object:
 
 
 def destination(path: Path) -> Path:
-    """Create the folder of a result, and return its path.
+    """Create the folder of a result and return its path.
 
-    RunError is raised if the path is an existing file that is not ordinary, or contains HDF5 data.
+    RunError is raised if the path belongs to something other than an ordinary file, or to an HDF5
+    file.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.is_symlink() or (path.exists() and not path.is_file()):
@@ -110,19 +111,19 @@ def destination(path: Path) -> Path:
     if path.exists() and h5py.is_hdf5(path):
         raise RunError(f"{path}: holds HDF5 data, which a result does not replace")
     if path.exists() and path.stat().st_nlink > 1:
-        path.unlink()  # other hard links keep the old content
+        path.unlink()  # other hard links to the file keep its content
     return path
 
 
 class TemporaryFolder:
-    """Temporary folder for an output file, which is removed when no object refers to it any longer.
+    """Temporary folder of an output file, removed when no object refers to it any longer.
 
-    If a worker process returns a run to its parent, the parent removes the folder. If a run is sent
-    to worker processes, the sending process removes it when it ends.
+    If a worker process returns a run to its parent, the parent removes the folder. If a process
+    sends a run to its workers, it removes the folder itself when it ends.
     """
 
     def __init__(self, path: Path | None = None):
-        """Create a folder, or become responsible for removing that of a worker process."""
+        """Create a folder, or take over the folder of a worker process."""
         self.path = Path(tempfile.mkdtemp(prefix="ricochet-")) if path is None else path
         self.removal = Finalize(self, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
 
@@ -131,7 +132,7 @@ class TemporaryFolder:
         self.removal()
 
     def keep(self) -> None:
-        """Keep the folder until this process ends, and then remove it."""
+        """Keep the folder until this process ends."""
         if self.removal.still_active():
             self.removal.cancel()
             Finalize(None, shutil.rmtree, (self.path, True), exitpriority=PRIORITY)
@@ -140,12 +141,12 @@ class TemporaryFolder:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Prepare the object for pickling, and determine which process will remove the folder."""
+        """Pickle the folder, and determine which process will remove it."""
         in_worker = multiprocessing.parent_process() is not None
         self.removal.cancel() if in_worker else self.keep()
         return received, (self.path, in_worker)
 
 
 def received(path: Path, sent_by_worker: bool) -> TemporaryFolder | None:
-    """Return the folder of a run sent by a worker process, or None if the parent sent it."""
+    """Return the folder of a run sent by a worker process, or None if its parent sent it."""
     return TemporaryFolder(path) if sent_by_worker else None

@@ -1,4 +1,4 @@
-"""Checks of files written by other programs, before and after their data are read."""
+"""Checks of files of other programs, before and after their data are read."""
 
 from pathlib import Path
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 __all__ = ["DAMAGE", "check_counts", "check_index", "check_values"]
 
-#: Exceptions that can occur while data of a damaged file are interpreted.
+#: Exceptions that may occur while the data of a damaged file are interpreted.
 DAMAGE = (
     ArithmeticError,
     AttributeError,
@@ -18,23 +18,23 @@ DAMAGE = (
     TypeError,
     ValueError,
 )
-MAGIC = 0x65DF65DF65DF65DF  # first number of a GSD file
-#: Header of a GSD file: positions and sizes of the index and of the list of names.
+MAGIC = 0x65DF65DF65DF65DF  # first number in a GSD file
+#: Header of a GSD file, with positions and sizes of the index and of the list of names.
 HEADER = np.dtype([("magic", "<u8"), ("index", "<u8", 2), ("names", "<u8", 2)])
-#: Entry of the index of a GSD file: an array of N x M values at a position in the file.
+#: Entry in the index of a GSD file: an array of N x M values at a position in the file.
 ENTRY = np.dtype("<u8, <u8, <i8, <u4, <u2, u1, u1")
 ENTRY.names = "frame", "N", "place", "M", "id", "type", "flags"
 NAME_BYTES = 64  # size of an entry in the list of names
 TYPE_BYTES = np.array([0, 1, 2, 4, 8, 1, 2, 4, 8, 4, 8, 1])  # size of a value of each type
-#: Groups of a GSD frame, each of which has a number of members.
+#: Groups of a GSD frame, each with a number of members.
 GROUPS = ("particles", "bonds", "angles", "dihedrals", "impropers", "constraints", "pairs")
 
 
 def check_index(path: Path) -> None:
-    """Raise ValueError if a GSD file is shorter than its header or its index states.
+    """Raise ValueError if a GSD file is shorter than its header or index implies.
 
-    The package gsd trusts the counts and positions in a file, and would allocate more than the
-    memory or read beyond the end of the file.
+    The package gsd trusts the counts and positions in a file. For a damaged one it would allocate
+    too much memory, or read beyond the end of the file.
     """
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -46,7 +46,8 @@ def check_index(path: Path) -> None:
             raise ValueError("it is shorter than its header says")
         file.seek(place)
         entries = np.fromfile(file, ENTRY, count)
-    entries = entries[: np.append(entries["place"], 0).tolist().index(0)]  # the rest is unused
+    # the remaining entries are unused
+    entries = entries[: np.append(entries["place"], 0).tolist().index(0)]
     known = (entries["type"] > 0) & (entries["type"] < len(TYPE_BYTES))
     if not np.all(known) or np.any(entries["frame"] >= count):
         raise ValueError("an entry of its index is damaged")
@@ -56,9 +57,9 @@ def check_index(path: Path) -> None:
 
 
 def check_counts(file: Any, path: Path, frame: int) -> None:
-    """Raise ValueError if a frame of an open GSD file counts more members than the file has bytes.
+    """Raise ValueError if a frame of a GSD file counts more members than the file has bytes.
 
-    The first frame, which gsd also reads, is checked too.
+    The first frame is checked, too, because gsd always reads it.
     """
     for name in (f"{group}/N" for group in GROUPS):
         for k in {0, frame}:
@@ -70,10 +71,10 @@ def check_counts(file: Any, path: Path, frame: int) -> None:
 
 
 def check_values(arrays: dict[str, np.ndarray]) -> None:
-    """Raise ValueError unless all numbers of a frame are possible.
+    """Raise ValueError if values in a frame are impossible.
 
-    `arrays` are "time", the corners "lower" and "upper" of the box (2,), and for N disks "position"
-    and "velocity" (N, 2) and other quantities (N,).
+    `arrays` are "time"; the corners "lower" and "upper" of the box (2,); and, for N disks,
+    "position" and "velocity" (N, 2) and other quantities (N,).
     """
     for name, values in arrays.items():
         if not np.all(np.isfinite(values)):

@@ -1,6 +1,6 @@
-"""Types for quantities of the disks in all frames, and for time series of observables.
+"""Types for per-disk quantities in all frames, and for time series of observables.
 
-Both can be used like arrays in expressions and in NumPy functions, as in `run.velocity * 2` or
+Both can be used like arrays in expressions and NumPy functions, as in `run.velocity * 2` or
 `run.observable("all/temperature").mean()`.
 """
 
@@ -19,49 +19,49 @@ WHOLE = (type(None), type(...), bool, np.bool_)  # first indices that do not sel
 
 
 class NoSuchFrame(RunError, IndexError):
-    """Error for the number of a frame that does not exist."""
+    """Error for the index of a frame that does not exist."""
 
 
 class Values(NDArrayOperatorsMixin):
-    """Base class for arithmetic with NumPy arrays as results."""
+    """Base class of types that act as NumPy arrays in expressions."""
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """Return all values of the quantity or time series as an array."""
+        """Return all values as an array."""
         raise NotImplementedError
 
     def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        """Convert the operands to arrays, and call the NumPy function."""
+        """Convert the operands to arrays and call the NumPy function."""
         if any(isinstance(item, Values) for item in options.get("out", ())):
             return NotImplemented
         arrays = [np.asarray(item) if isinstance(item, Values) else item for item in inputs]
         return getattr(function, method)(*arrays, **options)
 
     def mean(self, axis: Any = None, **options: Any) -> Any:
-        """Return the mean of all values, or the means along an axis; see `numpy.mean`."""
+        """Return the mean of all values or along an axis; see `numpy.mean`."""
         return np.asarray(self).mean(axis, **options)
 
     def std(self, axis: Any = None, **options: Any) -> Any:
-        """Return the standard deviation of all values, or those along an axis; see `numpy.std`."""
+        """Return the standard deviation of all values or along an axis; see `numpy.std`."""
         return np.asarray(self).std(axis, **options)
 
     def sum(self, axis: Any = None, **options: Any) -> Any:
-        """Return the sum of all values, or the sums along an axis; see `numpy.sum`."""
+        """Return the sum of all values or along an axis; see `numpy.sum`."""
         return np.asarray(self).sum(axis, **options)
 
     def min(self, axis: Any = None, **options: Any) -> Any:
-        """Return the minimum of all values, or the minima along an axis; see `numpy.min`."""
+        """Return the minimum of all values or along an axis; see `numpy.min`."""
         return np.asarray(self).min(axis, **options)
 
     def max(self, axis: Any = None, **options: Any) -> Any:
-        """Return the maximum of all values, or the maxima along an axis; see `numpy.max`."""
+        """Return the maximum of all values or along an axis; see `numpy.max`."""
         return np.asarray(self).max(axis, **options)
 
 
 class Series(Values):
-    """Time series of an observable: an array of times (T,) and an array of values (T, ...).
+    """Time series of an observable: times (T,) and values (T, ...).
 
-    These are usually not the times of the frames. Indices, NumPy functions and arithmetic use the
-    values: `series[-1]` is the last value. `time, value = series` assigns both arrays.
+    The times are usually not those of the frames. Indices, NumPy functions and arithmetic apply to
+    the values: `series[-1]` is the last value. `time, value = series` assigns both arrays.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class Series(Values):
     """
 
     def __init__(self, time: np.ndarray, value: np.ndarray):
-        """Create a time series from the given times and values."""
+        """Create a time series from times and values."""
         self.time, self.value = time, value
 
     def __len__(self) -> int:
@@ -93,7 +93,7 @@ class Series(Values):
         return self.value[index]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """Return a NumPy array of the values."""
+        """Return the values as a NumPy array."""
         return np.array(self.value, dtype=dtype, copy=copy)
 
     def __repr__(self) -> str:
@@ -119,7 +119,7 @@ class Series(Values):
 
 @dataclass(frozen=True, eq=False)
 class Frames(Values):
-    """A quantity of each disk in all frames, read from the output file when needed.
+    """A per-disk quantity in all frames, read from the output file on demand.
 
     An index such as `[-1]` reads only the selected frames; `[:]`, expressions and NumPy functions
     read all of them.
@@ -128,14 +128,14 @@ class Frames(Values):
     path: Path
     name: str
     shape: tuple[int, ...]  # (T, N), or (T, N, 2)
-    # keeps a temporary file as long as this object exists
+    # keeps a temporary file in existence
     folder: object = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return self.shape[0]
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        """Yield one frame after another, each read when needed."""
+        """Yield the frames one by one, reading each on demand."""
         return (self[k] for k in range(len(self)))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
@@ -148,16 +148,16 @@ class Frames(Values):
 
     @property
     def ndim(self) -> int:
-        """Number of axes of the quantity in all frames."""
+        """Number of axes of the array."""
         return len(self.shape)
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """NumPy type of the numbers that an index returns."""
+        """NumPy type of the values."""
         return self.read(np.arange(0)).dtype
 
     def __getitem__(self, index: Any) -> np.ndarray:
-        """Return the values that a NumPy index selects, reading only these frames."""
+        """Return the values that a NumPy index selects, reading only the selected frames."""
         first, *rest = index if isinstance(index, tuple) and index else (index,)
         try:
             if type(first) in WHOLE or np.ndim(first) > 1:
@@ -172,7 +172,7 @@ class Frames(Values):
             raise NoSuchFrame(f"{self.path}: {self.name} ({shape}): {problem}") from None
 
     def read(self, chosen: np.ndarray) -> np.ndarray:
-        """Read the chosen frames from the file, in the order of their numbers in `chosen`."""
+        """Read frames from the file, in the order of their indices in `chosen`."""
         steps = np.unique(np.diff(chosen))
         with open_file(self.path) as file:
             if self.name not in file[DISKS]:

@@ -10,7 +10,7 @@ from .frames import Series
 
 
 def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
-    """Yield the names of all time series in an HDF5 group and in its subgroups."""
+    """Yield the names of all time series in an HDF5 group and its subgroups."""
     for name, item in group.items():
         if isinstance(item, h5py.Group):
             if "value" in item:
@@ -31,15 +31,15 @@ def series_of(file: h5py.File, name: str, count: int) -> Series:
 
 
 def committed(file: h5py.File, group: str) -> int:
-    """Return the number of samples in a group that have been written completely.
+    """Return the number of complete samples in a group.
 
-    An unfinished file also has space for further samples, with invalid numbers.
+    An unfinished file has allocated space, with invalid numbers, for further samples.
     """
     return int(file[group]["committed"][()])
 
 
 def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
-    """Return the first `count` rows of a dataset, or all, as double precision if they are real."""
+    """Return the first `count` rows of a dataset, or all; real numbers in double precision."""
     values = data[:count]
     if count is not None and len(values) < count:
         raise Unsound(f"{data.name} holds {len(values)} of {count} samples")

@@ -1,12 +1,12 @@
-"""Traits of a run: physical properties that determine which theories apply to it.
+"""Traits of a run: the physical properties that determine which theories apply to it.
 
     run.nature                      # Nature({'inelastic', 'walls', ...}), the differences from
                                     # equal smooth elastic disks in an empty periodic box
     run.nature.closed               # whether only collisions change the energy
     allow(run, "Haff's law", "inelastic", "mixture")   # an error for any other trait
 
-`nature_of` determines the traits from the parameters and the energy balance of a run, both for
-output files and for simulations in memory.
+`nature_of` determines the traits from the input variables and the energy balance, both for output
+files and for simulations in memory.
 """
 
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ import numpy as np
 
 from .files import RunError
 
-ROUNDING = 1e-6  # relative energy loss below which it is a rounding error
-#: Every trait, with its description in an error message.
+ROUNDING = 1e-6  # relative energy loss up to which it may be a rounding error
+#: All traits, with their descriptions in error messages.
 TRAITS = {
     "changed": "was changed during the run",
     "collapsed": "passed an inelastic collapse, after which rounding errors determine its state",
@@ -45,7 +45,7 @@ TRAITS = {
     "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
-#: Traits of runs whose energy changes for reasons other than dissipation in collisions.
+#: Traits of runs whose energy does not only change by dissipation in collisions.
 SOURCES = {
     "changed",
     "sheared",
@@ -58,25 +58,25 @@ SOURCES = {
     "sliding_surfaces",
 }
 SOURCES |= {"thermostatted", "thermal_walls"}
-THERMOSTATS = ("andersen", "brownian")  # kinds of driving with a heat bath
-#: Traits of runs whose velocities also change between collisions.
+THERMOSTATS = ("andersen", "brownian")  # kinds of driving that act as a heat bath
+#: Traits of runs in which velocities also change between collisions.
 KICKED = {"noise_driven", "active", "recycled", "thermostatted"}
-#: Traits of runs whose velocities do not relax to a Maxwell distribution.
+#: Traits of runs whose velocities do not relax to the Maxwell distribution.
 UNSETTLED = {*SOURCES, "unequal_temperatures", "inelastic", "soft_contacts", "round_container"} - {
     "thermostatted",
     "thermal_walls",
     "piston",
 }
-#: Traits that permit velocities to relax to a Maxwell distribution.
+#: Traits with which velocities may relax to the Maxwell distribution.
 SETTLED = TRAITS.keys() - UNSETTLED
 
 
 class Refused(RunError):
-    """Error for a run to which a theory does not apply; the message states the reason."""
+    """Error for a run to which a theory does not apply, with the reason in its message."""
 
 
 class Nature(frozenset[str]):
-    """Set of all traits of a run; the possible traits are the keys of `TRAITS`."""
+    """Set of all traits of a run; `TRAITS` lists the possible ones."""
 
     @property
     def closed(self) -> bool:
@@ -85,12 +85,12 @@ class Nature(frozenset[str]):
 
     @property
     def driven(self) -> bool:
-        """True if processes other than dissipation in collisions change the energy of the disks."""
+        """True if the energy of the disks changes otherwise than by dissipation in collisions."""
         return not self.closed
 
     @property
     def cooling(self) -> bool:
-        """True for a freely cooling gas, which never reaches a steady state."""
+        """True for a freely cooling gas, which reaches no steady state."""
         return self.closed and "inelastic" in self
 
     @property
@@ -100,12 +100,12 @@ class Nature(frozenset[str]):
 
     @property
     def keeps_kinetic_energy(self) -> bool:
-        """True if the translational kinetic energy, and therefore kT, is conserved on average."""
+        """True if the translational kinetic energy, and thus kT, is conserved on average."""
         return self.keeps_energy and not self & {"gravity", "rough", "rotating"}
 
     @property
     def in_equilibrium(self) -> bool:
-        """True if the velocities relax to the Maxwell distribution of a uniform temperature."""
+        """True if velocities relax to the Maxwell distribution of a uniform temperature."""
         return not self & UNSETTLED
 
 
@@ -117,10 +117,10 @@ def nature_of(
     turning: bool,
     collapsed: bool,
 ) -> Nature:
-    """Return the traits of a run, determined from its parameters and its energy balance.
+    """Return the traits of a run, given its input variables and its energy balance.
 
-    `lost` is the dissipated energy over the largest kinetic energy, `turning` is true if the disks
-    can rotate, and `collapsed` if an inelastic collapse occurred.
+    `lost` is the dissipated energy relative to the largest kinetic energy, `turning` is True if the
+    disks can rotate, and `collapsed` if an inelastic collapse occurred.
     """
     contact, drive = parameters.get("contact", {}), parameters.get("drive", {})
     box, kind = parameters.get("box", {}), drive.get("kind", "none")
@@ -128,8 +128,8 @@ def nature_of(
     motions = {one.get("motion", "still") for one in surfaces}
     beta = float(contact.get("tangential_restitution", -1.0))
     pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
-    # A run is "inelastic" from the start if collisions of two disks dissipate energy, and after the
-    # first loss of energy if only walls do.
+    # A run counts as "inelastic" from the start if disk-disk collisions dissipate energy, but only
+    # after the first loss of energy if nothing but walls does.
     slips = beta > -1 and (beta < 1 or contact.get("friction") is not None)
     inelastic = len(mass) > 1 and (pairs.min() < 1 or slips)
     found = {
@@ -176,7 +176,7 @@ def nature_of(
 
 
 def opens(parameters: Mapping[str, Any]) -> bool:
-    """Return whether disks can leave or enter the box, or could before a change."""
+    """Return whether disks can leave or enter the box, or could do so before a change."""
     species = parameters.get("species", {})
     waiting = any(one.get("waiting", 0) for one in species.values() if isinstance(one, Mapping))
     lids = any(one.get("open") for one in parameters.get("side", {}).values())
@@ -184,7 +184,7 @@ def opens(parameters: Mapping[str, Any]) -> bool:
 
 
 def changes_in(parameters: Mapping[str, Any]) -> str:
-    """Return the changes of a run."""
+    """Return the text that lists the changes during a run."""
     return str(parameters.get("changes", "")).replace(" ", "")
 
 
@@ -198,14 +198,14 @@ def surfaces_of(parameters: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def bath_temperatures(parameters: Mapping[str, Any]) -> list[float]:
-    """Return kT of each heat bath, that is, of thermal boundaries and thermostats."""
+    """Return kT of each heat bath (thermal boundary or thermostat)."""
     drive, surfaces = parameters.get("drive", {}), surfaces_of(parameters)
     baths = [float(drive["temperature"])] if drive.get("kind") in THERMOSTATS else []
     return baths + [float(one["temperature"]) for one in surfaces if known(one.get("temperature"))]
 
 
 def drifts(parameters: Mapping[str, Any]) -> bool:
-    """Return whether the centre of mass is free of external forces along at least one axis."""
+    """Return whether no external force acts on the centre of mass along at least one axis."""
     if "obstacle" in parameters or "wall" in parameters:
         return False
     box = parameters.get("box", {})
@@ -214,7 +214,7 @@ def drifts(parameters: Mapping[str, Any]) -> bool:
 
 
 def held_round(parameters: Mapping[str, Any]) -> bool:
-    """Return whether all disks are in a round container that lies inside the sides of the box."""
+    """Return whether all disks are enclosed by a round container inside the sides of the box."""
     box, rows = parameters.get("box", {}), rows_of(parameters.get("obstacle", {}))
     if len(rows) != 1 or not rows[0].get("inside") or "wall" in parameters:
         return False
@@ -224,23 +224,23 @@ def held_round(parameters: Mapping[str, Any]) -> bool:
 
 
 def rows_of(group: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Convert columns, such as those of a group of obstacles, to a list of rows."""
+    """Convert a dictionary of columns, such as a group of obstacles, to a list of rows."""
     columns = {name: column for name, column in group.items() if np.ndim(column) > 0}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def known(value: Any) -> bool:
-    """Return whether the input specifies `value`, which is None, NaN or 0 if it does not."""
+    """Return whether `value` is given; a value that is not given is None, NaN or 0."""
     return value is not None and bool(np.isfinite(value)) and float(value) > 0
 
 
 def stays_in_box(run: Any) -> None:
-    """Raise an error if disks leave or enter the box during the run."""
+    """Raise Refused if disks leave or enter the box during the run."""
     allow(run, "the script needs disks that stay in the box", *TRAITS.keys() - {"open"})
 
 
 def allow(run: Any, law: str, *traits: str) -> None:
-    """Raise Refused, with a message that ends with `law`, for a trait not in `traits`."""
+    """Raise Refused for any trait not in `traits`; its message ends with `law`."""
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:
             raise Refused(f"{getattr(run, 'path', 'the simulation')}: {reason}; {law}")

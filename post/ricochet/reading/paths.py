@@ -1,4 +1,4 @@
-"""Exact paths of disks between frames, calculated from the collisions in the event log."""
+"""Exact paths of disks between frames, reconstructed from the event log."""
 
 from typing import NamedTuple
 
@@ -9,23 +9,23 @@ from .reader import SIDES, EventLog, Run
 
 
 class Turns(NamedTuple):
-    """Velocities of disks after their collisions, sorted by frame, then by disk, then by time."""
+    """Velocities of disks after their collisions, sorted by frame, disk and time."""
 
-    frame: np.ndarray  # (M,) index of the previous frame
-    disk: np.ndarray  # (M,) indices
+    frame: np.ndarray  # (M,) index of the frame before the collision
+    disk: np.ndarray  # (M,) indices of the disks
     time: np.ndarray  # (M,)
-    velocity: np.ndarray  # (M, 2) afterwards; NaN if the disk has left the box
+    velocity: np.ndarray  # (M, 2) after the collision; NaN if the disk has left the box
 
 
 def why_no_log_tells(run: Run) -> str:
-    """Return why no event log determines the paths of a run, or '' if one does."""
+    """Return why paths cannot be reconstructed from any event log of the run, or ''."""
     if "recycled" in run.nature:
         return "recycled disks jump between frames"
     return "the driving bends the paths between" if run.nature & KICKED else ""
 
 
 def why_unknown(run: Run, log: EventLog) -> str:
-    """Return the reason why paths cannot be computed from the event log, or '' if they can."""
+    """Return why paths cannot be reconstructed from this event log, or ''."""
     if log.momentum_change is None:
         return "the log has no momentum_change"
     if reason := why_no_log_tells(run):
@@ -34,11 +34,11 @@ def why_unknown(run: Run, log: EventLog) -> str:
 
 
 def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
-    """Return the number (T,) of events in the event log before each frame."""
+    """Return the number (T,) of logged events before each frame."""
     if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
     # The number of events before a frame follows from the event counts of all disks, even if
-    # several events occurred at exactly this time.
+    # several events occurred at exactly the time of the frame.
     hits = run.event_count[frames].sum(axis=1, dtype=np.int64)
     return np.searchsorted(np.cumsum(1 + (log.j > 0)), hits, "right")
 
@@ -57,8 +57,7 @@ def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) 
     signs = np.where(order < len(i), 1, -1)[:, None]
     event, disk, frame = event[order] + ends[0], disk[order], frame[order]
     gain = signs * log.momentum_change[event] / run.mass[disk, None]
-    # Velocity changes are summed separately for each disk and for each interval that starts at a
-    # frame.
+    # Velocity changes are summed separately for each disk and each interval between frames.
     first = np.flatnonzero(np.diff(frame * run.n_disks + disk, prepend=-1))
     sums = np.cumsum(gain, axis=0)
     sums -= np.repeat(sums[first] - gain[first], np.diff(first, append=len(disk)), axis=0)

@@ -1,14 +1,16 @@
 """Read output files of Ricochet.
 
-    from ricochet import read_run run = read_run("runs/gas.h5") run.time                 # (T,)
-    times of the frames run.position[-1]         # (N, 2)  one frame, read from the file on demand
+    from ricochet import read_run
+    run = read_run("runs/gas.h5")
+    run.time                 # (T,)    times of the frames
+    run.position[-1]         # (N, 2)  one frame, read from the file on demand
     run.speed(-1)            # (N,)    derived quantities take a frame, a slice or a list
     run.observable("all/kinetic_energy").value
 
-T is the number of frames, N that of disks, and S that of species. All quantities are in the units
-of the input file. Frames are read on demand, so a file may be larger than the memory. A `.part`
-file, to which the program is still writing, is read up to its last complete frame. Only this module
-and the modules `results` and `layout` depend on the layout of the HDF5 file.
+T is the number of frames, N that of disks and S that of species. All quantities are in the units of
+the input file. Frames are read on demand, so that a file may be larger than the memory. An
+unfinished output (`.part`) is read up to its last complete frame. Only this module and the modules
+`results` and `layout` depend on the layout of the HDF5 file.
 """
 
 from collections.abc import Iterator
@@ -47,14 +49,14 @@ __all__ = [
 
 
 class Run(BoxResults):
-    """The results of one run: arrays of constants, frames, and time series of observables.
+    """Results of one run: arrays of constants, frames, and time series of observables.
 
-    T is the number of frames and N that of disks; all quantities are in the units of the input
+    T is the number of frames and N that of disks. All quantities are in the units of the input
     file. See `read_run`.
     """
 
     def __repr__(self) -> str:
-        """Return a description of the run in one line."""
+        """Return a one-line description of the run."""
         kinds = ", ".join(f"{np.sum(kind.disks)} {kind.name}" for kind in self.by_species)
         frames = f"{self.n_frames} frame{'s' * (self.n_frames > 1)}, t = {span(self.time)}"
         return f"<Run {self.path}: {kinds}; {frames}>"
@@ -64,7 +66,7 @@ class Run(BoxResults):
         return len(self.time)
 
     def __getitem__(self, frame: int) -> "Frame":
-        """Return the frame with the given number; the last frame also has the number -1."""
+        """Return the frame with the given index, counted from the last frame if negative."""
         if not -len(self) <= frame < len(self):
             raise NoSuchFrame(f"{self.path}: there is no frame {frame} of {len(self)}")
         return Frame(self, frame % len(self))
@@ -98,7 +100,7 @@ class Run(BoxResults):
         Raises
         ------
         RunError
-            if there is no species of that name
+            if there is no species of this name
 
         Examples
         --------
@@ -151,10 +153,11 @@ class Run(BoxResults):
         return 0.5 * self.mass * np.sum(self.velocity[as_index(frame)] ** 2, axis=-1)
 
     def unwrapped(self, frame: Index) -> np.ndarray:
-        """Return positions that are continuous in time, even when disks cross periodic sides.
+        """Return positions that are continuous in time when disks cross periodic sides.
 
         In a sheared box (Lees-Edwards boundary conditions) the periodic image above the box is
-        displaced along x by gamma L_y t, with the shear rate gamma and the height L_y.
+        displaced along x by gamma L_y t, where gamma is the shear rate and L_y the height of the
+        box.
 
         Parameters
         ----------
@@ -169,7 +172,7 @@ class Run(BoxResults):
         Raises
         ------
         RunError
-            if disks are recycled, so that continuous positions do not exist
+            if disks are recycled, which makes their positions discontinuous
 
         Examples
         --------
@@ -201,7 +204,7 @@ class Run(BoxResults):
         Returns
         -------
         numpy.ndarray
-            (..., N) distances [length], across periodic sides
+            (..., N) distances [length] between unwrapped positions
 
         Examples
         --------
@@ -211,7 +214,7 @@ class Run(BoxResults):
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
     def per_disk(self, name: str) -> Frames:
-        """Return a quantity of each disk that only some output files contain.
+        """Return a per-disk quantity that only some output files contain.
 
         Parameters
         ----------
@@ -221,13 +224,12 @@ class Run(BoxResults):
         Returns
         -------
         Frames
-            values of shape (T, N); the values of a frame are read from the file when that frame is
-            selected by an index
+            (T, N) values; an index reads the selected frames from the file
 
         Raises
         ------
         RunError
-            if the frames do not contain the quantity
+            if the frames do not contain this quantity
 
         Examples
         --------
@@ -240,17 +242,17 @@ class Run(BoxResults):
 
     @property
     def angular_velocity(self) -> Frames:
-        """Angular velocities (T, N) [1/time], which exist only if the disks can rotate."""
+        """Angular velocities (T, N) [1/time]; only if the disks can rotate."""
         return self.per_disk("angular_velocity")
 
     @property
     def orientation(self) -> Frames:
-        """Angles (T, N) of the disks to the x axis [rad], not reduced modulo 2 pi."""
+        """Angles (T, N) between disks and the x axis [rad], not reduced modulo 2 pi."""
         return self.per_disk("orientation")
 
     @property
     def present(self) -> Frames | None:
-        """1 for disks in the box, 0 for disks outside (T, N); None if no disk leaves or enters."""
+        """1 for disks in the box and 0 for disks outside (T, N); None for a closed system."""
         return self.disk_data.get("present")
 
     def in_box(self, frame: int) -> np.ndarray:
@@ -264,7 +266,7 @@ class Run(BoxResults):
         Returns
         -------
         numpy.ndarray
-            (n,) indices, in ascending order; all disks of a closed system
+            (n,) indices in increasing order; those of all disks in a closed system
 
         Examples
         --------
@@ -286,9 +288,9 @@ class Run(BoxResults):
         Returns
         -------
         xarray.Dataset
-            all quantities of the frames, and mass, radius and species of each disk, with the
-            dimensions "time", "disk" and "component" ("x" and "y"); attributes are the path and the
-            seed
+            all quantities in the frames, and mass, radius and species of each disk, with the
+            dimensions "time", "disk" and "component" ("x" and "y"); the attributes are the path and
+            the seed
 
         Raises
         ------
@@ -316,12 +318,13 @@ class Run(BoxResults):
         return xarray.Dataset(data, axes, {"path": str(self.path), "seed": self.seed})
 
     def pressure(self, t1: float, t2: float) -> float:
-        """Return the mean pressure between the two samples closest in time to `t1` and `t2`.
+        """Return the mean pressure between the samples closest in time to `t1` and `t2`.
 
-        It is (<K> + dW / (2 dt)) / <A>, with the kinetic energy K (relative to the mean flow of a
-        sheared box), the accessible area A and the increase dW of the virial in the time dt; means
-        are trapezoidal. Between walls it is smaller than the force per length of a wall: for equal
-        disks of radius r in a square of side L, by the factor 1 - 2 r / L.
+        It is (<K> + dW / (2 dt)) / <A>, where K is the kinetic energy (relative to the mean flow in
+        a sheared box), A the accessible area and dW the increase of the virial during the time dt.
+        Averages use the trapezoidal rule. Between walls the result is smaller than the force per
+        length on a wall: for equal disks of radius r in a square of side L, by the factor 1 - 2
+        r / L.
 
         Parameters
         ----------
@@ -355,9 +358,9 @@ class Run(BoxResults):
     def pressure_tensor(self, t1: float, t2: float) -> np.ndarray:
         """Return the mean pressure tensor between the samples closest in time to `t1` and `t2`.
 
-        It is (<sum of m v_a v_b> + dW_ab / dt) / <A>, with the accessible area A and the increase
-        dW of the virial tensor (`output.virial_tensor = .true.`) in the time dt. Its trace is twice
-        the pressure.
+        It is (<sum of m v_a v_b> + dW_ab / dt) / <A>, where A is the accessible area and dW the
+        increase of the virial tensor (`output.virial_tensor = .true.`) during the time dt. Its
+        trace is twice the pressure.
 
         Parameters
         ----------
@@ -372,7 +375,7 @@ class Run(BoxResults):
         Raises
         ------
         RunError
-            if there are fewer than two samples of the observables, or no virial tensor
+            if there is no virial tensor, or fewer than two samples of the observables
 
         Examples
         --------
@@ -387,7 +390,7 @@ class Run(BoxResults):
         return ((time_mean(time, kinetic) + virial / duration) / area).reshape(2, 2)
 
     def _between(self, name: str, t1: float, t2: float) -> Series:
-        """Return the samples of an observable between the samples nearest to `t1` and `t2`."""
+        """Return the samples of an observable between those closest in time to `t1` and `t2`."""
         time, value = self.observable(name)
         first, last = (int(np.argmin(np.abs(time - t))) for t in (t1, t2))
         if not time[first] < time[last]:
@@ -399,7 +402,7 @@ class Run(BoxResults):
 
     @property
     def restitution(self) -> float:
-        """Restitution of two disks; NaN if it depends on species or velocity."""
+        """Coefficient of restitution of two disks; NaN if it depends on species or velocity."""
         return self.contact_law.xi if self.contact_law.law == "constant" else np.nan
 
     @property
@@ -420,7 +423,7 @@ class Run(BoxResults):
 
     @property
     def termination_note(self) -> str:
-        """Reason why the run ended early; empty if a stop rule ended the run."""
+        """Reason why the run ended early; empty if it ended by one of its stop conditions."""
         note = "".join(filter(str.isprintable, str(self.provenance.get("note", ""))))
         if self.path.suffix != ".part":
             early = ":" if note.startswith("an inelastic collapse occurred") else " ended early:"
@@ -446,16 +449,16 @@ class Run(BoxResults):
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame of a run, whose arrays are read from the file on demand.
+    """One frame of a run, with arrays read from the file on demand.
 
-    `for frame in run` visits all frames, and `run[-1]` is the last one.
+    `for frame in run` visits all frames; `run[-1]` is the last one.
 
     Parameters
     ----------
     run : ricochet.Run
-        the run that contains the frame
+        run that contains the frame
     index : int
-        number of the frame, from 0
+        index of the frame
 
     Examples
     --------
@@ -471,7 +474,7 @@ class Frame:
 
     @property
     def time(self) -> float:
-        """Time at which the frame was written."""
+        """Time of the frame."""
         return float(self.run.time[self.index])
 
     @property
@@ -490,7 +493,7 @@ class Frame:
         return self.run.speed(self.index)
 
     def per_disk(self, name: str) -> np.ndarray:
-        """Return a quantity of each disk in this frame; see `Run.per_disk`."""
+        """Return a per-disk quantity in this frame; see `Run.per_disk`."""
         return self.run.per_disk(name)[self.index]
 
 
@@ -500,17 +503,17 @@ def read_run(path: str | Path) -> Run:
     Parameters
     ----------
     path : str or Path
-        the output file; for an unfinished run the file NAME.h5.part
+        the output file; of an unfinished run, the file NAME.h5.part
 
     Returns
     -------
     Run
-        the run up to the last complete frame
+        the run up to its last complete frame
 
     Raises
     ------
     RunError
-        if the file cannot be used; the message is one line
+        if the file is unusable; the message is one line
 
     Examples
     --------
@@ -521,7 +524,7 @@ def read_run(path: str | Path) -> Run:
 
 
 def open_run(path: Path, folder: object = None) -> Run:
-    """Open the output file of a run; `folder` exists as long as an object reads the file."""
+    """Open the output file of a run; `folder` exists as long as any object reads the file."""
     with open_file(path) as file:
         if DISKS not in file or "h5md" not in file:
             raise Unsound("an HDF5 file, but not of a Ricochet run")
@@ -532,7 +535,7 @@ def open_run(path: Path, folder: object = None) -> Run:
 
 
 def run_of(path: Path, file: h5py.File, folder: object = None) -> Run:
-    """Return the run that is stored in an open HDF5 file."""
+    """Return the run stored in an open HDF5 file."""
     disks, count = file[DISKS], committed(file, DISKS)
     if {"pressure", "wall_collisions"} & set(file["observables"]):
         old = "was written by an earlier version of Ricochet, with other names"
@@ -545,7 +548,7 @@ def run_of(path: Path, file: h5py.File, folder: object = None) -> Run:
         if isinstance(item, h5py.Group) and "value" in item
     }
     parameters = tree(file["parameters"])
-    if "changes" in parameters:  # without those planned for a later time
+    if "changes" in parameters:  # without those scheduled for a later time
         made = str(parameters.pop("changes")).splitlines(keepends=True)
         now = float(rows(disks["position/time"], count)[-1])
         if made := [line for line in made if float(line.split(" ")[0]) <= now]:
@@ -578,5 +581,5 @@ def run_of(path: Path, file: h5py.File, folder: object = None) -> Run:
 
 
 def time_mean(time: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """Return the time average of samples (T, ...), calculated with the trapezoidal rule."""
+    """Return the time average of samples (T, ...) by the trapezoidal rule."""
     return np.trapezoid(value, time, axis=0) / (time[-1] - time[0])

@@ -1,4 +1,4 @@
-"""Types of the results of a run: events, obstacles, species, and the law of restitution."""
+"""Types for events, obstacles, species, changes and the law of restitution."""
 
 from typing import NamedTuple
 
@@ -6,34 +6,35 @@ import numpy as np
 
 
 class EventLog(NamedTuple):
-    """Arrays (E,) that describe the E events of a run in chronological order.
+    """The E events of a run in chronological order, as arrays (E,).
 
     An event is a collision of disk `i` with another disk or with a boundary. A positive `j` is the
-    id of the second disk; 0, -1, -2 and -3 denote the left, right, bottom and top side of the box,
-    and -4, -5, ... the circular obstacles and arcs, followed by the straight walls.
+    id of the other disk. The boundary ids 0, -1, -2 and -3 denote the left, right, bottom and top
+    side of the box, and -4, -5, ... the circular obstacles and arcs, followed by the straight
+    walls.
     """
 
     time: np.ndarray
-    i: np.ndarray  # id of a disk
+    i: np.ndarray  # id of a disk, counted from 1
     j: np.ndarray
     impulse: np.ndarray  # magnitude of the momentum change
     momentum_change: np.ndarray | None = None  # (E, 2) of disk i; None in files of older versions
 
 
 class Event(NamedTuple):
-    """One event, with the quantities of `EventLog`."""
+    """One event; see `EventLog`."""
 
     time: float
-    i: int  # id of a disk
+    i: int  # id of a disk, counted from 1
     j: int
     impulse: float  # magnitude of the momentum change
     momentum_change: np.ndarray  # (2,) of disk i
 
 
 class Obstacle(NamedTuple):
-    """A circular obstacle, which encloses the disks if `inside` is true, or an arc of a circle.
+    """Circular obstacle, which encloses the disks if `inside` is True, or arc of a circle.
 
-    An arc extends counter-clockwise from `from_angle` to `to_angle` [degrees], both None for a
+    An arc extends counter-clockwise from `from_angle` to `to_angle` [degrees]; both are None for a
     circle.
     """
 
@@ -45,11 +46,11 @@ class Obstacle(NamedTuple):
 
     @property
     def is_arc(self) -> bool:
-        """True if the obstacle is an arc, which encloses no area."""
+        """True for an arc, which encloses no area."""
         return self.from_angle is not None
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """Return the distances (...) of points (..., 2) from the outline of the obstacle.
+        """Return the distances of points from the outline of the obstacle.
 
         Parameters
         ----------
@@ -85,12 +86,12 @@ class Obstacle(NamedTuple):
         return self.points(2)
 
     def points(self, count: int) -> np.ndarray:
-        """Return equidistant points of the outline, from the first to the last.
+        """Return equally spaced points on the outline, both ends included.
 
         Parameters
         ----------
         count : int
-            Number of points
+            number of points
 
         Returns
         -------
@@ -111,16 +112,16 @@ class Obstacle(NamedTuple):
 
 
 class Species(NamedTuple):
-    """One species of disks; masses and radii differ within it if they are read from a file."""
+    """One species of disks, with differing masses and radii if they are read from a file."""
 
     name: str
     masses: np.ndarray  # (n,)
     radii: np.ndarray  # (n,)
-    disks: np.ndarray  # (N,) mask
+    disks: np.ndarray  # (N,) mask of all disks of the run
 
     @property
     def alike(self) -> bool:
-        """True if all disks of the species have the same mass and the same radius."""
+        """True if all disks of the species have the same mass and radius."""
         return bool(np.ptp(self.masses) == 0 and np.ptp(self.radii) == 0)
 
     @property
@@ -135,12 +136,12 @@ class Species(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name of the species and mass of its disks, for the legend of a figure."""
+        """Name of the species with the mass of its disks, for legends."""
         return f"{self.name}, m = {span(self.masses)}"
 
 
 class Change(NamedTuple):
-    """A change of a variable during a run; an empty `value` stands for the default."""
+    """Change of a variable during a run; an empty `value` stands for the default."""
 
     time: float
     name: str
@@ -148,7 +149,7 @@ class Change(NamedTuple):
 
 
 def changes_in(text: str) -> list[Change]:
-    """Return the changes described by lines of the form TIME GROUP.VARIABLE=VALUE."""
+    """Return the changes listed in a text with lines TIME GROUP.VARIABLE=VALUE."""
     lines = (line.partition(" ") for line in text.splitlines())
     return [Change(float(time), *rest.partition("=")[::2]) for time, _, rest in lines]
 
@@ -156,7 +157,7 @@ def changes_in(text: str) -> list[Change]:
 class Restitution(NamedTuple):
     """Coefficient of normal restitution of a pair of disks.
 
-    With the `law` "constant" it is `xi` for all impact velocities, otherwise only above `speed`.
+    It is `xi` at all impact velocities if `law` is "constant", otherwise only above `speed`.
     """
 
     xi: float
@@ -169,15 +170,15 @@ class Restitution(NamedTuple):
 
     @property
     def name(self) -> float | str:
-        """Constant coefficient of restitution, or the name of its velocity-dependent law."""
+        """The constant coefficient, or the name of the velocity-dependent law."""
         return self.xi if self.law == "constant" else f"{self:g}"
 
     def at(self, g: np.ndarray) -> np.ndarray:
-        """Return the coefficients of restitution for normal impact velocities `g`, an array.
+        """Return the coefficients of restitution at normal impact velocities `g`, an array.
 
-        The velocity-dependent law is 1 - y + c y^2 with y proportional to g^(1/5) (Ramirez and
-        others, Physical Review E 60, 4465 (1999)). "elastic_below" is 1 minus a rounding error
-        below `speed`, so that a gas has a finite, though very long, cooling time at all energies.
+        The viscoelastic law is 1 - y + c y^2 with y proportional to g^(1/5) (Ramirez and others,
+        Physical Review E 60, 4465 (1999)). "elastic_below" is 1 minus a rounding error below
+        `speed`, so that the cooling time of a gas is very long but finite at all energies.
         """
         if self.law == "elastic_below":
             return np.where(g < self.speed, np.nextafter(1.0, 0.0), self.xi)
@@ -188,6 +189,6 @@ class Restitution(NamedTuple):
 
 
 def span(values: np.ndarray, digits: int = 6) -> str:
-    """Return the smallest and largest value as text, or one value if all are equal."""
+    """Return the smallest and largest value as text, or a single value if all are equal."""
     ends = (f"{values.min():.{digits}g}", f"{values.max():.{digits}g}")
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)

@@ -1,4 +1,4 @@
-"""The results in an output file: constants, frames, observables, and the event log."""
+"""Contents of an output file: constants, frames, observables and event log."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,36 +17,38 @@ from .units import UNNAMED, Units
 if TYPE_CHECKING:
     import pandas
 
-CHUNK = 10**6  # largest number of disks in frames that are read together
+CHUNK = 10**6  # largest number of disks read at a time, in all frames together
 SIDES = ("left", "right", "bottom", "top")
 TENSORS = ("virial_tensor", "kinetic_tensor", "helfand_stress")
 
 
 @dataclass(frozen=True)
 class Results:
-    """The results of one run, as an output file contains them."""
+    """Results of one run, as stored in its output file."""
 
     path: Path
     time: np.ndarray  # (T,)
-    position: Frames  # (T, N, 2), wrapped into the box along a periodic axis
-    velocity: Frames  # (T, N, 2); not available if `output.frame_columns` omits it
-    image: Frames | None  # (T, N, 2) periods crossed; None without periodic sides
-    event_count: Frames | None  # (T, N) numbers per disk; None if not in the frames
-    recycled: Frames | None  # (T, N) how often each disk was recycled; None if no disk can be
-    disk_data: dict[str, Frames]  # (T, N) further quantities of the disks, by name
+    position: Frames  # (T, N, 2), wrapped into the box along periodic axes
+    velocity: Frames  # (T, N, 2); missing if `output.frame_columns` omits it
+    image: Frames | None  # (T, N, 2) image counters; None without periodic sides
+    event_count: Frames | None  # (T, N) number of events; None if not in the frames
+    recycled: Frames | None  # (T, N) how often each disk was recycled; None without recycling
+    disk_data: dict[str, Frames]  # (T, N) further per-disk quantities, by name
     mass: np.ndarray  # (N,)
     radius: np.ndarray  # (N,)
-    species: np.ndarray  # (N,) 1-based
-    names: tuple[str, ...]  # of the species
-    lower: np.ndarray  # (2,) corner of the box
-    edges: np.ndarray  # (2,) lengths of the box
+    species: np.ndarray  # (N,) index of the species, from 1
+    names: tuple[str, ...]  # names of the species
+    lower: np.ndarray  # (2,) lower left corner of the box
+    edges: np.ndarray  # (2,) edge lengths of the box
     periodic: np.ndarray  # (2,) bool
     obstacles: tuple[Obstacle, ...]
-    walls: np.ndarray  # (W, 2, 2) straight walls, from one point to another
-    parameters: dict[str, Any]  # group -> variable -> value used in the run
+    walls: np.ndarray  # (W, 2, 2) end points of the straight walls
+    parameters: dict[str, Any]  # by group and variable, the value used in the run
     provenance: dict[str, Any]
-    units: Units = field(default=UNNAMED, kw_only=True)  # names of the units for labels of axes
-    _folder: object = field(default=None, kw_only=True, repr=False)  # keeps a temporary file
+    # names of the units, for the labels of axes
+    units: Units = field(default=UNNAMED, kw_only=True)
+    # keeps a temporary file in existence
+    _folder: object = field(default=None, kw_only=True, repr=False)
 
     @property
     def n_disks(self) -> int:
@@ -64,14 +66,14 @@ class Results:
         Parameters
         ----------
         group, variable : str
-            names in the input, such as "contact" and "restitution"
+            names in the input file, such as "contact" and "restitution"
         default : object
-            value to return if the variable has no value
+            value to return if the variable has none
 
         Returns
         -------
         object
-            a number, a text or an array
+            a number, a string or an array
 
         Examples
         --------
@@ -109,7 +111,7 @@ class Results:
 
     @cached_property
     def _samples(self) -> int:
-        """Number of samples of the observables in the file when the run was first read."""
+        """Number of samples of the observables when the run was first read."""
         with open_file(self.path) as file:
             return committed(file, "observables")
 
@@ -120,13 +122,13 @@ class Results:
             return tuple(series_in(file["observables"]))
 
     def to_dataframe(self) -> "pandas.DataFrame":
-        """Return the observables as a pandas DataFrame with a row for each sample.
+        """Return the observables as a pandas DataFrame with one row per sample.
 
         Returns
         -------
         pandas.DataFrame
-            (T', columns), indexed by time; columns are names such as `all/kinetic_energy`, and
-            components such as `momentum_x` and `virial_tensor_xy`
+            (T', columns), indexed by time; the columns are observables such as
+            `all/kinetic_energy`, and components such as `momentum_x` and `virial_tensor_xy`
 
         Raises
         ------
@@ -158,7 +160,7 @@ class Results:
         Returns
         -------
         EventLog
-            (E,) times, partners and impulses of all events
+            (E,) times, collision partners and impulses of all events
 
         Raises
         ------
@@ -190,15 +192,15 @@ class Results:
 
     @cached_property
     def collisions_per_disk(self) -> Series:
-        """Mean number of collisions of each disk with other disks, as a function of time."""
+        """Mean number of disk-disk collisions per disk as a function of time."""
         time, collisions = self.observable("collisions")
         return Series(time, 2 * collisions / self.n_disks)
 
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
-        """Return the mean number of collisions with other disks per disk at the given times.
+        """Return the mean number of disk-disk collisions per disk at the given times.
 
-        It is interpolated between samples of the observables and, if there are more frames than
-        samples, between event counts of the frames.
+        It is interpolated between samples of the observables or, if there are more frames than
+        samples, with the help of the event counts of the frames.
 
         Parameters
         ----------
@@ -208,7 +210,7 @@ class Results:
         Returns
         -------
         numpy.ndarray
-            (...) mean number of collisions per disk since the start
+            (...) mean number of collisions per disk since the start of the run
 
         Examples
         --------
@@ -219,7 +221,8 @@ class Results:
         known, tau = self.collisions_per_disk
         if self.event_count is None or len(known) >= self.n_frames:
             return np.interp(time, known, tau)
-        hits, rising = self.events_per_disk, 1e-12 / max(self.time[-1], 1e-300)  # also at rest
+        # strictly increasing even at rest
+        hits, rising = self.events_per_disk, 1e-12 / max(self.time[-1], 1e-300)
 
         def clock(t: np.ndarray) -> np.ndarray:
             return np.interp(t, self.time, hits) + rising * np.asarray(t)
@@ -228,7 +231,7 @@ class Results:
 
     @cached_property
     def events_per_disk(self) -> np.ndarray:
-        """Mean number (T,) of events per disk between the start and each frame."""
+        """Mean number (T,) of events per disk from the start up to each frame."""
         if self.event_count is None:
             raise RunError(f"{self.path}: has no event_count in its frames")
         step = max(1, CHUNK // self.n_disks)
@@ -237,7 +240,7 @@ class Results:
 
     @cached_property
     def nature(self) -> Nature:
-        """Traits of the run, which determine the theories that apply to the run."""
+        """Traits of the run, which determine the applicable theories."""
         lost = self.observable("dissipated_energy").value[-1]
         most = self.n_disks * self.observable("all/kinetic_energy").value[[0, -1]].max()
         return nature_of(

@@ -1,6 +1,6 @@
 """Names of units in the labels of axes.
 
-The numbers in an input file have no units, and names of units change labels but no numbers.
+The numbers in an input file have no units; naming units changes labels but no numbers.
 """
 
 from typing import NamedTuple
@@ -26,24 +26,24 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Units(NamedTuple):
-    """Names of the units of length, time, mass and energy; the name of an unknown unit is empty."""
+    """Names of the units of length, time, mass and energy; empty if unknown."""
 
     length: str = ""
     time: str = ""
     mass: str = ""
-    energy: str = ""  # if empty, composed of the other three units
+    energy: str = ""  # composed of the other three units if empty
 
     def label(self, words: str, quantity: str = "") -> str:
         """Return the label of an axis, for example 'time (s)' or 'time (reduced units)'.
 
-        `POWERS` contains the unit for the key `quantity` or, if it is empty, `words`; that of a
-        probability density is the reciprocal of a quantity, such as '1/speed'.
+        The unit is that of `quantity`, by default `words`, in `POWERS`. A probability density has
+        the reciprocal unit, given as '1/speed', for example.
         """
         unit = self.name(quantity or words)
         return f"{words} ({unit})" if unit else words
 
     def coordinate(self, name: str) -> str:
-        """Return the short label of an axis of the box: 'x (m)', or 'x' without a unit."""
+        """Return the short label of an axis of the box: 'x (m)', or 'x' if the unit is unknown."""
         return f"{name} ({self.length})" if self.length else name
 
     def name(self, quantity: str) -> str:
