@@ -1,25 +1,27 @@
-"""Start Ricochet, read its output files, and analyse them.
+"""Run Ricochet, read its output files, and analyse them.
 
-    import ricochet run = ricochet.run("input/gas.nml") run = ricochet.read_run("runs/gas.h5") curve
-    = ricochet.structure.pair_correlation(run)
+    import ricochet
+    run = ricochet.run("input/gas.nml")
+    run = ricochet.read_run("runs/gas.h5")
+    curve = ricochet.structure.pair_correlation(run)
 
-The modules are in sub-packages, which `README.md` in this folder describes, and have short names:
-`from ricochet import structure` imports `ricochet.analysis.structure`. A module is loaded when it
-is first used, so that `import ricochet` alone loads neither Matplotlib nor a web server.
+The modules are in sub-packages (see `README.md` in this folder) and have short names: `from
+ricochet import structure` imports `ricochet.analysis.structure`. A module is loaded when it is
+first used, so that `import ricochet` alone loads neither Matplotlib nor a web server.
 """
 
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from . import packages as packages  # the first import, because it reports missing packages
+from . import packages as packages  # imported first, because it reports missing packages
 from .aliases import Aliases
 from .reading.bridges import mdanalysis_universe
 from .reading.files import RunError
 from .reading.frames import Frames, Series
 from .reading.reader import Event, EventLog, Frame, Obstacle, Run, read_run
 from .reports import analyse
-from .reports import analyses as analyses  # not listed: an object, which has no docstring
+from .reports import analyses as analyses  # not listed, because it is an object without a docstring
 from .running.ensembles import ensemble, sweep
 from .running.program import ProgramError, example, run
 from .running.simulation import Simulation
@@ -48,7 +50,7 @@ __all__ = [
     "write_start",
 ]
 
-if TYPE_CHECKING:  # imports for type checkers of the modules that `__getattr__` loads
+if TYPE_CHECKING:  # for type checkers only, because `__getattr__` loads these modules
     from .analysis import cooling as cooling
     from .analysis import correlations as correlations
     from .analysis import crater as crater
@@ -110,7 +112,7 @@ else:
     sys.meta_path.append(ALIASES)
 
     def __getattr__(name: str) -> object:
-        """Return the module that has the given short name."""
+        """Return the module with the given short name."""
         if name in ALIASES.modules:
             return import_module(f"{__name__}.{name}")
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

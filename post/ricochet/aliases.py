@@ -22,7 +22,7 @@ def modules() -> dict[str, str]:
 
 
 class Aliases(MetaPathFinder, Loader):
-    """Import finder for short module names, which Python calls after all other finders."""
+    """Import finder for short module names, called after all other finders."""
 
     def __init__(self) -> None:
         """Collect the short and full names of all modules."""
@@ -38,5 +38,5 @@ class Aliases(MetaPathFinder, Loader):
         return ModuleSpec(name, self, origin=self.modules[short])
 
     def exec_module(self, module: ModuleType) -> None:
-        """Store the module under its short name in `sys.modules`."""
+        """Register the module under its short name in `sys.modules`."""
         sys.modules[module.__name__] = import_module(self.modules[module.__name__.split(".")[-1]])

@@ -1,4 +1,4 @@
-"""Report missing packages; all scripts import `ricochet` before other packages."""
+"""Report missing packages; all scripts import `ricochet` before any other package."""
 
 import sys
 from importlib.util import find_spec

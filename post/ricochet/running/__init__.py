@@ -1,1 +1,1 @@
-"""Simulations: the program, the engine in memory, sweeps of many runs, and starting files."""
+"""Simulations: the program, the engine in memory, sweeps, and initial-configuration files."""

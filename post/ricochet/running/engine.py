@@ -1,4 +1,4 @@
-"""Load the library of the engine, which `ricochet.h` describes, and call its functions."""
+"""Load the library of the engine (see `ricochet.h`) and call its functions."""
 
 import ctypes
 import functools
@@ -9,11 +9,11 @@ from pathlib import Path
 from ..commands import HERE
 from .program import ProgramError
 
-ROOM = 100_000  # size of a message [bytes]
+ROOM = 100_000  # size of the buffer for a message [bytes]
 
 
 def c_text(text: str | Path) -> bytes:
-    """Encode a text or a path for the library; raise an error if the text contains a zero byte."""
+    """Encode a text or path for the library; raise ValueError if it contains a zero byte."""
     words = os.fsencode(text) if isinstance(text, Path) else text.encode(errors="surrogateescape")
     if b"\0" in words:
         raise ValueError(f"{text!r} has a zero byte")
@@ -21,7 +21,7 @@ def c_text(text: str | Path) -> bytes:
 
 
 def opened(make: Callable[..., int], *arguments: object) -> int:
-    """Return the simulation handle from a library function, or raise the error of the function."""
+    """Return the simulation handle that a library function creates, or raise its error."""
     message, code = ctypes.create_string_buffer(ROOM), ctypes.c_int()
     handle = make(*arguments, message, ROOM, ctypes.byref(code))
     if not handle:
@@ -30,7 +30,7 @@ def opened(make: Callable[..., int], *arguments: object) -> int:
 
 
 def called(function: Callable[..., int], *arguments: object) -> bool:
-    """Call a library function, raise an error after a failure, and return whether to repeat it."""
+    """Call a library function, raising its error; return whether the call must be repeated."""
     message = ctypes.create_string_buffer(ROOM)
     code = function(*arguments, message, ROOM)
     if code > 1:
@@ -40,14 +40,15 @@ def called(function: Callable[..., int], *arguments: object) -> bool:
 
 @functools.cache
 def library(files: bool = False) -> ctypes.CDLL:
-    """Load the library of the engine; if `files` is true, load the version with HDF5 files."""
+    """Load the library of the engine, with support of HDF5 files if `files` is True."""
     name = "libricochet_files.so" if files else "libricochet.so"
     wish = os.environ.get("RICOCHET_LIBRARY")  # a folder
     places = [Path(wish)] if wish else [HERE / "lib", HERE.parents[1] / "build"]
     path = next((place / name for place in places if (place / name).is_file()), None)
     if path is None:
         raise ProgramError(f"no {name} in {places[-1]}: run make library in a clone", 3)
-    engine = ctypes.CDLL(str(path))  # local symbols do not clash with the HDF5 of h5py
+    # loaded with local symbols, which do not clash with the HDF5 library of h5py
+    engine = ctypes.CDLL(str(path))
     p, n, text = ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p
     long, real = ctypes.c_int64, ctypes.c_double
     answer = [ctypes.c_char_p, n]

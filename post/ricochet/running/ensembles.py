@@ -1,12 +1,13 @@
-"""Sweeps (many runs of one input in parallel) and tables of their results.
+"""Sweeps, in which many runs of one input are executed in parallel, and tables of their results.
 
-    values = {"contact.restitution": [0.8, 0.9], "run.seed": range(8)} table =
-    ricochet.sweep("input/gas.nml", values, "runs/scan") table = ricochet.ensemble("runs/scan")
-    # a row per member run; also for runs/ensemble.sh
+    values = {"contact.restitution": [0.8, 0.9], "run.seed": range(8)}
+    table = ricochet.sweep("input/gas.nml", values, "runs/scan")
+    table = ricochet.ensemble("runs/scan")   # one row per member run; also for runs/ensemble.sh
 
-A sweep can be interrupted at any time, and the same call continues it. Its folder contains
-input.nml, manifest.txt with the overrides of each member, and NAME.h5 and NAME.log of each member.
-`runs/ensemble.sh` writes the same files, so that each can continue member runs of the other.
+A sweep can be interrupted at any time; the same call continues it. Its folder contains input.nml,
+manifest.txt with the overrides of each member run, and NAME.h5 and NAME.log for each member run.
+`runs/ensemble.sh` writes the same files, so that a sweep started by one of the two can be continued
+by the other.
 """
 
 import contextlib
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 FINISHED = ": is a finished run, "
 BROKE_OFF = ": its run broke off "
 LOOK = 0.2  # interval at which a worker checks for an interrupt [s]
-LONGEST_NAME = 200  # characters in the name of a member
+LONGEST_NAME = 200  # longest name of a member run [characters]
 GOES_ON = re.compile(r"(stopped.*|killed by signal.*|.*--resume continues.*|)")
 
 
@@ -55,32 +56,34 @@ def sweep(
 ) -> "pandas.DataFrame":
     """Run an input with all combinations of the given values of variables.
 
-    Interrupted member runs are continued, and finished ones are not repeated. They are extended if
-    the input has changed in variables that may change on a resume, such as the end of the run.
+    Interrupted member runs are continued and finished ones are not repeated, unless the input has
+    changed in variables that may change on a resume, such as the end of the run; they are then
+    extended.
 
     Parameters
     ----------
     system : str, Path or mapping
         the input, as for `ricochet.run`
     values : mapping of str to object, or list of them
-        a value or a list of values for each variable (None: its default), of which the first varies
+        a value or a list of values for each variable (None: its default), the first varying
         slowest; a list of such dictionaries varies several variables together
     folder : str or Path
         folder for the files of the member runs
     executor : concurrent.futures.Executor, optional
-        executor with access to the folder [all cores of this machine]
+        executor whose processes can access the folder [all cores of this machine]
 
     Returns
     -------
     pandas.DataFrame
-        the table of the member runs, as returned by `ensemble`
+        table of the member runs, as returned by `ensemble`
 
     Raises
     ------
     ProgramError
-        if the program refuses the input of a member; all are checked before the first run
+        if the program refuses the input of a member run; all inputs are checked before the first
+        run
     RunError
-        if the folder or a log cannot be used, or the name of a member would be too long
+        if the folder or a log is unusable, or the name of a member run is too long
     ValueError
         if `values` is empty
 
@@ -94,7 +97,8 @@ def sweep(
     >>> list(ricochet.sweep(small, linked, folder / "linked")["collisions"])
     [10, 20]
     """
-    optional_package("pandas", "a table of members")  # reported before the runs
+    # a missing package is reported before the runs
+    optional_package("pandas", "a table of members")
     folder = Path(folder)
     text = read_input(system, folder / "input")
     members = [
@@ -122,7 +126,7 @@ def sweep(
         for member in waiting:
             member.result()
     finally:
-        mark.unlink(missing_ok=True)  # running members write a checkpoint and stop
+        mark.unlink(missing_ok=True)  # running members then write a checkpoint and stop
         for member in waiting:
             member.cancel()
         if executor is None:
@@ -131,7 +135,7 @@ def sweep(
 
 
 def choices_of(values: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Return a dictionary with a list of values for each variable."""
+    """Return a dictionary with the list of values of each variable."""
     return {
         name: [own] if isinstance(own, str) or not isinstance(own, Iterable) else list(own)
         for name, own in flat(values).items()
@@ -139,15 +143,15 @@ def choices_of(values: Mapping[str, Any]) -> dict[str, list[Any]]:
 
 
 def combinations(choices: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
-    """Yield the settings of each combination of values; the first variable varies slowest."""
+    """Yield the settings of each combination of values, with the first variable varying slowest."""
     pairs = [[(name, value) for value in own] for name, own in choices.items()]
     yield from map(dict, itertools.product(*pairs))
 
 
 def check(text: str, members: Iterable[Mapping[str, Any]]) -> None:
-    """Raise an error for values that the program refuses.
+    """Raise ProgramError if the program refuses one of the values.
 
-    Each value of a variable is checked once, in the first member run that uses it; seeds are not.
+    Each value of a variable, except seeds, is checked once, in the first member run that uses it.
     """
     known: set[str] = set()
     for settings in members:
@@ -161,7 +165,7 @@ def check(text: str, members: Iterable[Mapping[str, Any]]) -> None:
 
 
 def names_of(members: Iterable[Mapping[str, Any]], taken: Mapping[str, str]) -> dict[str, str]:
-    """Return a dictionary from the name of each member run to its overrides in the manifest."""
+    """Return a dictionary from the names of the member runs to their overrides in the manifest."""
     found: dict[str, str] = {}
     known = dict(taken)
     for settings in members:
@@ -179,7 +183,7 @@ def names_of(members: Iterable[Mapping[str, Any]], taken: Mapping[str, str]) -> 
 
 
 def name_of(settings: Mapping[str, Any]) -> str:
-    """Return the name that `sweep` and runs/ensemble.sh form for a member run from its settings."""
+    """Return the name that `sweep` and runs/ensemble.sh give to a member run, from its settings."""
     parts = []
     for variable, value in settings.items():
         short = variable.removeprefix("species.")
@@ -192,7 +196,7 @@ def name_of(settings: Mapping[str, Any]) -> str:
 
 
 def words_of(settings: Mapping[str, object]) -> str:
-    """Return the text of overrides in a line of the manifest."""
+    """Return the overrides as text for a line of the manifest."""
     words = {
         name: "" if value is None else value_text(name, value, ",")
         for name, value in settings.items()
@@ -210,10 +214,10 @@ def read_manifest(folder: Path) -> dict[str, str]:
 
 
 def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
-    """Write input.nml and manifest.txt; raise an error if member runs with data change settings."""
+    """Write input.nml and manifest.txt, unless this would alter settings of runs that have data."""
     door = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(door, fcntl.LOCK_EX)  # one command at a time, as in runs/ensemble.sh
+        fcntl.flock(door, fcntl.LOCK_EX)  # only one command at a time, as in runs/ensemble.sh
         remember_alone(folder, text, overrides)
     finally:
         os.close(door)
@@ -236,15 +240,15 @@ def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> Non
             )
     from_elsewhere = [] if path.is_file() else [files_of(folder, name)[0] for name in overrides]
     if not path.is_file() or old != text:
-        put(path, text)  # newer than the members that are finished: `run_member` extends them
+        put(path, text)  # becomes newer than finished members, which `run_member` therefore extends
     for result in filter(None, from_elsewhere):
-        result.touch()  # it is left as it is
+        result.touch()  # so that this run is left as it is
     lines = sorted(f"{name}\t{rest}\n" for name, rest in {**before, **overrides}.items())
     put(folder / "manifest.txt", "".join(lines))
 
 
 def may_continue(folder: Path, old: str, new: str) -> bool:
-    """Return whether two inputs differ only in variables that may change when a run is resumed."""
+    """Return whether two inputs differ only in variables that may change on a resume."""
     program = find_program()
     table = json.loads(subprocess.check_output([program, "--print-variables"]))
     kept = []
@@ -277,7 +281,7 @@ def put(path: Path, text: str) -> None:
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
     """Return the paths of the finished and the unfinished output of a member run, or None.
 
-    Both exist while a finished run is being extended; it then counts as unfinished.
+    While a finished run is being extended, both exist and the run counts as unfinished.
     """
     whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
     unfinished = part if part.is_file() else None
@@ -285,7 +289,7 @@ def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
 
 
 def log_of(path: Path) -> TextIO:
-    """Open the log of a member run for appending; refuse symbolic links and hard links."""
+    """Open the log of a member run for appending, refusing symbolic and hard links."""
     way = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
     try:
         log = os.fdopen(os.open(path, way, 0o666), "a")
@@ -300,7 +304,7 @@ def log_of(path: Path) -> TextIO:
 
 
 def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
-    """Perform a member run, unless it is finished or runs elsewhere, and return its exit code."""
+    """Execute a member run, unless it is finished or running elsewhere; return its exit code."""
     if not wanted(mark):
         return STOPPED
     with log_of(folder / f"{name}.log") as log:
@@ -312,7 +316,7 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
         if finished and not is_older(finished, folder / "input.nml"):
             return 0
         if before := last_words(folder, name):
-            print(file=log, flush=True)  # separates the log from that of an earlier attempt
+            print(file=log, flush=True)  # separates this attempt from an earlier one
         words = [word for pair in pairs_of(overrides) for word in ("--set", "=".join(pair))]
         output = ["-o", folder / f"{name}.h5", "--quiet", *words]
         command = [find_program(), folder / "input.nml", *output]
@@ -321,10 +325,10 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
         resume = ["--resume"] * bool(finished or unfinished)
         code = finished_with([*command, *resume], mark, **pipes)
         if finished and FINISHED in last_words(folder, name):
-            finished.touch()  # the run already satisfies the new stop rules
+            finished.touch()  # the run satisfies the new stop conditions already
             return 0
         if unfinished and BROKE_OFF in last_words(folder, name):
-            code = finished_with(command, mark, **pipes)  # the member starts from the beginning
+            code = finished_with(command, mark, **pipes)  # start again from the beginning
         if code < 0:
             memory = " (out of memory?)" * (-code == signal.SIGKILL)
             moment = time.strftime("%FT%T%z")
@@ -336,12 +340,12 @@ def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
 
 
 def is_older(path: Path, other: Path) -> bool:
-    """Return whether the file `path` was last written before the file `other`."""
+    """Return whether the file `path` was modified before the file `other`."""
     return path.stat().st_mtime_ns < other.stat().st_mtime_ns
 
 
 def is_there(pid: int) -> bool:
-    """Return whether a process with the number `pid` exists on this machine."""
+    """Return whether a process with the id `pid` exists on this machine."""
     try:
         os.kill(pid, 0)
     except OSError as problem:
@@ -352,7 +356,7 @@ def is_there(pid: int) -> bool:
 def wanted(mark: Path) -> bool:
     """Return whether the call of `sweep` that created the file `mark` is still in progress.
 
-    The file is deleted if the process on this machine that created it no longer exists.
+    The file is deleted if the process that created it on this machine no longer exists.
     """
     _, pid, _, host = mark.name.split(" ", 3)
     if host == os.uname().nodename and not is_there(int(pid)):
@@ -361,7 +365,7 @@ def wanted(mark: Path) -> bool:
 
 
 def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
-    """Run a command and return its exit code; stop the command if the file `mark` is deleted."""
+    """Run a command and return its exit code; stop it if the file `mark` is deleted."""
     process: subprocess.Popen[bytes] = subprocess.Popen(tied(command), **pipes)
     try:
         while True:
@@ -370,14 +374,14 @@ def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
             if not wanted(mark):
                 process.terminate()
     finally:
-        process.terminate()  # has no effect if the command has ended
+        process.terminate()  # no effect if the command has ended
         parent = multiprocessing.parent_process()
         if parent and parent.pid and not is_there(parent.pid):
             os._exit(STOPPED)  # otherwise this process of a pool would wait for work forever
 
 
 def pairs_of(overrides: str) -> Iterator[tuple[str, str]]:
-    """Yield variable and value of each override in a line of a manifest, also of quoted values."""
+    """Yield variable and value, quoted or not, of each override in a line of a manifest."""
     parts = overrides.removeprefix("--set ").split(" --set ") if overrides else []
     while parts:
         part = parts.pop(0)
@@ -395,7 +399,7 @@ def last_words(folder: Path, name: str) -> str:
 
 
 def failed(folder: Path, name: str) -> bool:
-    """Return whether the log of a member run ends with a reason why the run cannot continue."""
+    """Return whether the log of a member run ends with a reason why it cannot continue."""
     words = last_words(folder, name)
     return not (files_of(folder, name)[0] or GOES_ON.fullmatch(words))
 
@@ -409,14 +413,14 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
     Parameters
     ----------
     folder : str or Path
-        folder that `sweep` or runs/ensemble.sh made
+        folder created by `sweep` or runs/ensemble.sh
 
     Returns
     -------
     pandas.DataFrame
-        a row per member: `member`, each override by its full name, `seed`, `state` ('finished',
-        'unfinished' or 'failed') and its `reason`, `wall_time` [s], and the last value of each
-        scalar observable
+        one row per member run: `member`, each override by its full name, `seed`, `state`
+        ('finished', 'unfinished' or 'failed') and its `reason`, `wall_time` [s], and the last value
+        of each scalar observable
 
     Raises
     ------
@@ -433,7 +437,7 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
 
 
 def gathered(folder: Path) -> list[dict[str, Any]]:
-    """Return the rows of the table that `ensemble` returns, with a row for each member run."""
+    """Return the rows of the table of `ensemble`."""
     if not folder.is_dir():
         raise RunError(f"{folder}: there is no such folder")
     overrides = read_manifest(folder)
@@ -447,13 +451,13 @@ def gathered(folder: Path) -> list[dict[str, Any]]:
 
 
 def in_order(name: str) -> list[tuple[int, float, str]]:
-    """Return a sort key for the name of a member run; numbers in names are sorted by value."""
+    """Return a sort key for the name of a member run that orders numbers by value."""
     parts = re.split(r"(\d+\.?\d*(?:e[+-]?\d+)?)", name)
     return [(0, float(part), "") if k % 2 else (1, 0.0, part) for k, part in enumerate(parts)]
 
 
 def row_of(folder: Path, name: str, overrides: str) -> dict[str, Any]:
-    """Return the row of a member run in the table that `ensemble` returns."""
+    """Return the row of a member run in the table of `ensemble`."""
     row: dict[str, Any] = {"member": name}
     row |= {variable: typed(value) for variable, value in pairs_of(overrides)}
     finished, unfinished = files_of(folder, name)
@@ -472,7 +476,7 @@ def row_of(folder: Path, name: str, overrides: str) -> dict[str, Any]:
 
 
 def typed(value: str) -> object:
-    """Convert the text of an override to a number, a bool, a tuple of numbers, or a string."""
+    """Convert an override to a number, a bool, a tuple of numbers, or a string."""
     if not value:
         return None
     if value.strip(".").lower() in ("true", "false", "t", "f"):
@@ -492,9 +496,9 @@ def typed(value: str) -> object:
 
 
 def last_values(path: Path) -> dict[str, Any]:
-    """Return seed, wall time and the last value of each scalar observable of a run.
+    """Return the seed, the wall time and the last value of each scalar observable of a run.
 
-    The low-level functions of h5py read the up to 10^5 files of a sweep in half of the time.
+    A sweep may have 10^5 files; the low-level functions of h5py read them in half of the time.
     """
     with open_file(path) as file:
         row = {"seed": plain(file["parameters/run"].attrs["seed"])}

@@ -1,4 +1,4 @@
-"""Read the text of input files, and write the input files that `Simulation.save` creates."""
+"""Read the text of input files, and write the inputs of `Simulation.save`."""
 
 import os
 import zlib
@@ -11,7 +11,7 @@ from .program import ProgramError, unseen
 
 
 def read_input(system: str | Path | Mapping[str, Any], place: Path | None = None) -> str:
-    """Return the text of an input, which is a file, a text, or a dictionary of groups."""
+    """Return the text of an input given as a file, a text, or a dictionary of groups."""
     if (text := unseen(system, place)) is not None:
         return text
     try:
@@ -21,13 +21,13 @@ def read_input(system: str | Path | Mapping[str, Any], place: Path | None = None
 
 
 def head_of(text: str) -> str:
-    """Return the first line of a saved input: a comment with a checksum of all other lines."""
+    """Return the first line of a saved input, a comment with a checksum of the remaining lines."""
     crc = zlib.crc32(text.encode(errors="surrogateescape"))
     return f"! Saved by ricochet.Simulation, which may replace it unless it is edited: {crc:08x}\n"
 
 
 def check_input_place(path: Path, output: Path) -> None:
-    """Raise an error if `save` would overwrite a file other than an input that `save` wrote."""
+    """Raise ProgramError if `save` would overwrite a file that it did not write itself."""
     c_text(path)
     try:
         if path.parent.resolve() == output.parent.resolve() and path.name in [
@@ -51,7 +51,7 @@ def check_input_place(path: Path, output: Path) -> None:
 
 
 def write_input(path: Path, text: str) -> None:
-    """Write an input to a new file at `path`, after deleting a file or link of that name."""
+    """Write an input to `path`, replacing a file or link of that name by a new file."""
     try:
         path.unlink(missing_ok=True)
         with path.open("x", encoding="utf-8", errors="surrogateescape") as file:

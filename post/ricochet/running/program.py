@@ -1,6 +1,6 @@
 """Run the program from Python with an input file or a dictionary, and return a `Run`.
 
-Its standard error is a pseudo-terminal, because it reports its progress only to a terminal.
+The program reports its progress only to a terminal, so its standard error is a pseudo-terminal.
 """
 
 import os
@@ -23,27 +23,27 @@ from ..reading.reader import Run, open_run
 from .starting import with_start
 
 STOPPED = 75
-PROGRESS = "\033[?7l"  # start of each update of the program's progress line on a terminal
+PROGRESS = "\033[?7l"  # start of each update of the progress line on a terminal
 PAUSE = 30.0  # interval of progress lines without a terminal [s]
-#: Folders in which the input files can be: that of an installed package, and that of a clone.
+#: Folders that may contain the input files: of an installed package, and of a clone.
 INPUTS = (HERE / "input", HERE.parents[1] / "input")
 ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
 
 class ProgramError(RunError):
-    """Error raised if the program cannot start or does not finish.
+    """Error of a program that cannot start or does not finish.
 
-    `message` contains the lines that the program printed, `code` is its exit code, and `path` the
+    `message` holds the lines that the program printed, `code` is its exit code, and `path` is the
     file with the completed part of the run, or None.
     """
 
     def __init__(self, message: str, code: int, path: Path | None = None):
-        """Store the message, which has several lines if the input contains several errors."""
+        """Store the message, with one line for each error in the input."""
         super().__init__(message)
         self.message, self.code, self.path = message, code, path
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return all attributes, so that `pickle` can pass the error from a worker process."""
+        """Return all attributes, so that a worker process can pass the error on by `pickle`."""
         return type(self), (self.message, self.code, self.path)
 
 
@@ -68,14 +68,14 @@ def run(
         values that replace those of the input, such as `{"species.gas.mass": 2}` or `{"contact":
         {"restitution": 0.9}}`; None stands for the default of a variable
     output : str or Path, optional
-        the output file [a temporary file, deleted when no object uses it any more]
+        output file [a temporary file, deleted when no object uses it any longer]
     force, resume : bool
-        whether the program is started with the option `--force` or `--resume`
+        start the program with the option `--force` or `--resume`
     threads : int, optional
         value of the variable `run.threads`
     progress : bool
-        whether to show the progress: continuously on a terminal and in a notebook, elsewhere as a
-        line every 30 s
+        show the progress, continuously on a terminal or in a notebook, otherwise as a line every 30
+        s
 
     Returns
     -------
@@ -113,7 +113,7 @@ def run(
     message = "\n".join(lines).replace(f"{work}{os.sep}", "")
     if code != 0:
         part = output.with_name(f"{output.name}.part")
-        written = part.is_file() and part.stat().st_mtime > began - 1  # newer than this run
+        written = part.is_file() and part.stat().st_mtime > began - 1  # written by this run
         message = without_options(named(message, groups), pairs)
         if temporary and written:
             folder.keep()
@@ -125,7 +125,7 @@ def run(
 
 
 def example(name: str) -> Path:
-    """Return the path of an input file that comes with Ricochet.
+    """Return the path of an input file supplied with Ricochet.
 
     Parameters
     ----------
@@ -135,12 +135,12 @@ def example(name: str) -> Path:
     Returns
     -------
     Path
-        the input file
+        path of the input file
 
     Raises
     ------
     RunError
-        if there is no such file; with the existing names
+        if there is no such file; the message suggests a name, or lists them all
 
     Examples
     --------
@@ -157,7 +157,7 @@ def example(name: str) -> Path:
 
 
 def whole_threads(threads: int | None) -> int:
-    """Check and return the number of threads; 0 means the number that the input states."""
+    """Return the number of threads after checking it; 0 stands for the number in the input."""
     if threads is None:
         return 0
     if not isinstance(threads, Integral) or not 1 <= threads <= 1024:
@@ -166,9 +166,9 @@ def whole_threads(threads: int | None) -> int:
 
 
 def find_program() -> str:
-    """Return the path of the program: the variable RICOCHET, or the first one found.
+    """Return the path of the program: that of the variable RICOCHET, or the first one found.
 
-    It is sought in the installed package, in the folder `build` of this clone, and on PATH.
+    The installed package, the folder `build` of this clone, and PATH are searched in this order.
     """
     root = HERE.parents[1]
     if wish := os.environ.get("RICOCHET"):
@@ -179,7 +179,7 @@ def find_program() -> str:
     for place in places:
         if place.is_file() and os.access(place, os.X_OK):
             return str(place.resolve())
-    build = [f"in {root / 'build'}"] if (root / "Makefile").is_file() else []  # else installed
+    build = [f"in {root / 'build'}"] if (root / "Makefile").is_file() else []  # otherwise installed
     where = f"at {wish}" if wish else " or ".join([*build, "on PATH"])
     make = "run make" if build else "run make install in a clone of Ricochet"
     raise ProgramError(
@@ -192,7 +192,7 @@ def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
 
     If Python is interrupted or killed, the program writes a checkpoint and ends.
     """
-    import pty  # imported here because it does not exist on Windows, where files can be read
+    import pty  # not at the top: Windows, where files can be read, has no such module
 
     ours, its = pty.openpty()
     process = subprocess.Popen(
@@ -218,29 +218,29 @@ def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
     finally:
         if process.poll() is None:
             process.terminate()
-            list(lines_from(ours))  # closed earlier, it would lose the last messages
+            list(lines_from(ours))  # closing the terminal earlier would lose the last messages
         process.wait()
         os.close(ours)
     return process.returncode, lines
 
 
 def tied(command: list[str]) -> list[str]:
-    """Return a command that receives SIGTERM, and writes a checkpoint, when this process ends.
+    """Return a command that receives SIGTERM, and then writes a checkpoint, when this process ends.
 
-    The tool setpriv of util-linux requests the signal, if it is available. A Python function
-    between fork and exec would not be safe in a process with several threads.
+    The tool setpriv of util-linux, if available, requests the signal. A Python function called
+    between fork and exec would be unsafe in a process with several threads.
     """
     setpriv = shutil.which("setpriv") if sys.platform == "linux" else None
     return [setpriv, "--pdeathsig", "TERM", "--", *command] if setpriv else command
 
 
 def lines_from(terminal: int) -> Iterator[str]:
-    """Yield the lines that a program writes to its terminal, including overwritten lines."""
+    """Yield the lines that a program writes to its terminal, including overwritten ones."""
     rest = b""
     while True:
         try:
             data = os.read(terminal, 65536)
-        except OSError:  # on Linux: no process writes to the terminal any longer
+        except OSError:  # raised by Linux when no process has the terminal open any longer
             data = b""
         *lines, rest = re.split(rb"[\r\n]", rest + data)
         yield from (line.decode(errors="replace") for line in (lines if data else [*lines, rest]))
@@ -254,8 +254,8 @@ def lines_from(terminal: int) -> Iterator[str]:
 def unseen(system: str | Path | Mapping[str, Any], place: Path | None = None) -> str | None:
     """Return the text of an input given as a text or a dictionary, or None for a file.
 
-    Arrays with a value for each disk are written to starting files in the folder of `place`, by
-    default in a temporary folder of this process.
+    Arrays with a value for each disk are written to initial-configuration files in the folder of
+    `place`, or in a temporary folder of this process.
     """
     if isinstance(system, Mapping):
         return namelist(system, place)
@@ -266,9 +266,10 @@ def unseen(system: str | Path | Mapping[str, Any], place: Path | None = None) ->
 
 
 def namelist(groups: Mapping[str, Any], place: Path | None = None) -> str:
-    """Return the text of an input file with the given groups; the program checks the values.
+    """Return the text of an input file with the given groups, whose values the program checks.
 
-    Arrays with a value for each disk are written to starting files in the folder of `place`.
+    Arrays with a value for each disk are written to initial-configuration files in the folder of
+    `place`.
     """
     text = []
     for name, content in groups.items():
@@ -297,7 +298,7 @@ def settings_of(overrides: Mapping[str, Any]) -> list[str]:
 
 
 def flat(overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Return overrides with full names as keys, such as "run.seed" instead of nested groups."""
+    """Return overrides with full names as keys, such as "run.seed", in place of nested groups."""
     if not isinstance(overrides, Mapping):
         kind = type(overrides).__name__
         raise TypeError(f"values are a dictionary as {{'run.seed': 2}}, not {kind}")
@@ -313,7 +314,7 @@ def flat(overrides: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def without_options(message: str, settings: Iterable[str]) -> str:
-    """Replace the option --set in the program's messages by the name of the override."""
+    """Replace the option --set in messages of the program by the name of the override."""
     for pair in settings:
         name = pair.partition("=")[0]
         place = re.compile(rf"^--set {re.escape(pair)}: (?:{name.split('.')[0]}[\w.]*: )?", re.M)
@@ -342,7 +343,7 @@ def value_text(name: str, value: object, separator: str = ", ") -> str:
     if isinstance(value, np.floating):
         value = float(value)
     if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()  # converted to Python's types, also for a single value
+        value = value.tolist()  # converted to Python types, even for a single value
     match value:
         case bool():
             return ".true." if value else ".false."

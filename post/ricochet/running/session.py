@@ -1,4 +1,4 @@
-"""Sessions with the engine in this process; a session owns one simulation in memory."""
+"""Sessions with the engine in this process, each of which owns a simulation in memory."""
 
 import ctypes
 import os
@@ -24,7 +24,7 @@ class Session:
         ALIVE.add(self)
 
     def close(self) -> None:
-        """Free the memory of the simulation; the simulation cannot be used after this call.
+        """Free the memory of the simulation, which cannot be used afterwards.
 
         Examples
         --------
@@ -62,10 +62,10 @@ class Session:
 
 
 class Held:
-    """Context manager that locks a simulation, so that no other thread advances or closes it."""
+    """Context manager that locks a simulation against other threads."""
 
     def __init__(self, simulation: Session):
-        """Store a simulation; the `with` statement locks it and receives its handle."""
+        """Store the simulation that the `with` statement locks and whose handle it returns."""
         self.simulation = simulation
 
     def __enter__(self) -> int:
@@ -80,7 +80,7 @@ class Held:
 
 
 def after_fork() -> None:
-    """After a fork, close in the child process the simulations that other threads advanced."""
+    """After a fork, close simulations in the child that other threads were advancing."""
     for simulation in ALIVE:
         if not simulation._lock.acquire(blocking=False):
             simulation._handle = None

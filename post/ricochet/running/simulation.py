@@ -1,11 +1,11 @@
-"""Simulations in memory, which Python can advance, change, analyse, save and load.
+"""Simulations in memory, which can be advanced, changed, analysed, saved and loaded.
 
     with ricochet.Simulation("input/gas.nml", {"run.seed": 2}) as gas:
         gas.advance(time=1.0)
         gas.position, gas.observable("all/kinetic_energy"), gas.next_events(3)
 
 The library (`make library`) contains the engine of the program. The state is bit-identical to that
-in a run of `build/ricochet` with the same input, whatever the times at which `advance` returned.
+of `build/ricochet` with the same input, whatever the times at which `advance` returned.
 """
 
 import math
@@ -36,7 +36,7 @@ ROUNDING = 1e-14  # relative rounding error of a time
 
 
 class Simulation(State):
-    """A simulation in the memory of this process, which starts at the initial state.
+    """Simulation in the memory of this process, starting in its initial state.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Simulation(State):
     Raises
     ------
     ProgramError
-        if the input contains an error; with the message of the program
+        if the input contains an error, with the message of the program
 
     Examples
     --------
@@ -69,7 +69,7 @@ class Simulation(State):
         overrides: Mapping[str, Any] | None = None,
         threads: int | None = None,
     ):
-        """Start a simulation of an input; the arguments are described in the class docstring."""
+        """Start a simulation of an input; see the docstring of the class."""
         text, groups = read_input(system), isinstance(system, Mapping)
         settings = settings_of({} if overrides is None else overrides)
         try:
@@ -90,20 +90,20 @@ class Simulation(State):
 
     @classmethod
     def _of(cls, text: str, settings: list[str]) -> Self:
-        """Return a simulation of the input `text`; each of `settings` is GROUP.VARIABLE=VALUE."""
+        """Return a simulation of an input text with `settings` of the form GROUP.VARIABLE=VALUE."""
         self = cls.__new__(cls)
         self._begin(text, settings)
         return self
 
     def _begin(self, text: str, settings: list[str], threads: int | None = None) -> None:
-        """Start the simulation of the input `text`; each of `settings` is GROUP.VARIABLE=VALUE."""
+        """Start a simulation of an input text with `settings` of the form GROUP.VARIABLE=VALUE."""
         words = c_text(text), c_text("\n".join(settings))
         engine = library(files=b".h5" in b"".join(words))
         self._take(opened(engine.ricochet_open, *words, whole_threads(threads)))
 
     def _take(self, handle: int) -> None:
         super()._take(handle)
-        self._settled = -1.0  # a time up to which all events are complete
+        self._settled = -1.0  # time up to which all events are complete
         self._start_energy = self.observable("all/kinetic_energy") * self.n_disks
 
     @classmethod
@@ -113,14 +113,14 @@ class Simulation(State):
         Parameters
         ----------
         path : str or Path
-            the output file, or the unfinished output, whose name ends in `.part`
+            output file, or unfinished output, whose name ends in `.part`
         threads : int, optional
             number of threads [that of the input, or one]
 
         Returns
         -------
         Simulation
-            the simulation, at the time of the checkpoint
+            the simulation at the time of the checkpoint
 
         Raises
         ------
@@ -141,25 +141,25 @@ class Simulation(State):
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
         """Write an output file that the command `ricochet INPUT -o path --resume` can continue.
 
-        The file contains the present state, and samples of the initial state (after a change: of
-        the present one). The command checks the space for the rest of the run. If variables were
-        changed with `change`, INPUT must contain the new values; the argument `input` writes this
-        file.
+        The file holds the present state and samples of the initial state (after a change: samples
+        of the present state). The command checks that there is space for the rest of the run. If
+        variables were changed with `change`, INPUT must contain the new values; the argument
+        `input` writes such a file.
 
         Parameters
         ----------
         path : str or Path
             output file of the run that will continue
         force : bool
-            whether an existing file may be replaced
+            replace an existing file
         input : str or Path, optional
-            file for the input with which the program continues the run: a new one, or one of an
-            earlier `save` that was not edited since
+            file to which the input of the continued run is written: a new file, or one written by
+            an earlier `save` and not edited since
 
         Returns
         -------
         Path
-            `path` with `.part` at its end
+            `path` with `.part` appended
 
         Raises
         ------
@@ -186,8 +186,8 @@ class Simulation(State):
         """Return an independent simulation in the same state.
 
         Copy and original remain bit-identical as long as the same methods are called. `copy.copy`,
-        `copy.deepcopy` and pickles work as well. A pickle contains a checkpoint for another
-        process, which needs the starting file that the input names, if any.
+        `copy.deepcopy` and pickles work as well. A pickle contains a checkpoint; a process that
+        loads it needs the initial-configuration file that the input names, if any.
 
         Returns
         -------
@@ -225,21 +225,21 @@ class Simulation(State):
         events: int | None = None,
         on_event: Callable[[Event], object] | None = None,
     ) -> Self:
-        """Advance the simulation until one of the limits, each counted from the start, is reached.
+        """Advance the simulation until one of the limits, counted from the start, is reached.
 
-        Without limits, the stop rules of the input apply. As in a run of the program, it ends
-        earlier if no further event can occur, or if a freely cooling gas has 1e-25 of its initial
-        temperature. After an interrupt (Ctrl-C) the simulation can be continued.
+        Without limits, the stop conditions of the input apply. As in a run of the program, the
+        simulation ends earlier if no further event can occur, or if a freely cooling gas has cooled
+        to 1e-25 of its initial temperature. After an interrupt (Ctrl-C) it can be continued.
 
         Parameters
         ----------
         time : float, optional
             time
         collisions : int, optional
-            number of collisions of two disks
+            number of disk-disk collisions
         events : int, optional
             number of events (collisions of any kind); this limit and that of `collisions` are
-            exact, even between simultaneous events, except that time steps are always completed
+            exact, even between simultaneous events, but time steps are always completed
         on_event : callable, optional
             function that receives an `Event` after each event, and may read and change the
             simulation; if it returns a true value, the simulation stops after this event or, with
@@ -253,7 +253,8 @@ class Simulation(State):
         Raises
         ------
         ValueError
-            if a limit has been passed, or if neither the arguments nor the input set a limit
+            if a limit has already been passed, or if neither the arguments nor the input set a
+            limit
         RunError
             if no further event can occur, so that no limit can be reached
         ProgramError
@@ -312,11 +313,11 @@ class Simulation(State):
         time : float, optional
             duration
         collisions : int, optional
-            number of further collisions of two disks
+            number of further disk-disk collisions
         events : int, optional
             number of further events (collisions of any kind)
         on_event : callable, optional
-            function that is called after each event, as for `advance`
+            function called after each event, as for `advance`
 
         Returns
         -------
@@ -346,7 +347,7 @@ class Simulation(State):
         return self.advance(**goals, on_event=on_event)  # type: ignore[arg-type]
 
     def _report(self, limits: tuple[float, int, int], on_event: Callable[[Event], object]) -> None:
-        """Advance towards the limits and call a function after each event."""
+        """Advance towards the limits, calling a function after each event."""
         stopped = False
         while not stopped:
             before = self.events
@@ -362,20 +363,21 @@ class Simulation(State):
                 stopped = bool(on_event(event)) or stopped
 
     def _endless(self) -> bool:
-        """Return whether the input sets no stop rule other than a limit of the wall-clock time."""
+        """Return whether the input sets no stop condition other than a limit of wall-clock time."""
         return self.parameters.get("stop", {}).keys() <= {"wall_clock"}
 
     def _go_on(self, limits: tuple[float, int, int], patience: float) -> bool:
-        """Advance for at most `patience` [s]; return True if no limit has been reached so far."""
+        """Advance for at most `patience` [s]; return True as long as no limit has been reached."""
         with self._open() as handle:
             return called(library().ricochet_advance, handle, *limits, patience)
 
     def _settle(self) -> float:
         """Advance to a time at which another simulation can reproduce the state; return this time.
 
-        `time` may be rounded after `advance`, and the engine may still have to shift its origin of
-        time. The time returned is slightly later and is reached exactly. It is the sum of the
-        origin and the time since the origin; not every number is such a sum, so several are tried.
+        After `advance`, `time` may be rounded, and the engine may still have to shift its origin of
+        time. The returned time is slightly later and is reached exactly: it is the sum of the
+        origin and the time since the origin. Since not every number is such a sum, several are
+        tried.
         """
         ulps = 0
         while self.time != self._settled:
@@ -387,10 +389,10 @@ class Simulation(State):
     def change(self, values: Mapping[str, Any]) -> Self:
         """Change variables of the simulation at the present time.
 
-        Gravity, driving, collision rules, and temperatures, velocities and motions of boundaries
-        can change. The change of the total energy is added to the observable `work`. A side starts
-        a new motion where it is; variables that only its former motion has, such as the force on a
-        piston, are dropped.
+        Gravity, driving and collision rules can change, and so can temperatures, velocities and
+        motions of boundaries. The change of the total energy is added to the observable `work`. A
+        side starts a new motion from its present position; variables that belong only to its former
+        motion, such as the force on a piston, are dropped.
 
         Parameters
         ----------
@@ -405,7 +407,7 @@ class Simulation(State):
         Raises
         ------
         ProgramError
-            if a variable cannot be changed; all variables then keep their values
+            if a variable cannot be changed, in which case all variables keep their values
 
         Examples
         --------
@@ -421,17 +423,15 @@ class Simulation(State):
             raise ProgramError(message, problem.code) from None
 
     def schedule(self, time: float, values: Mapping[str, Any]) -> Self:
-        """Plan a change of variables at a later time, as a group `&change` of the input does.
+        """Schedule a change of variables, like a group `&change` in the input.
 
-        `advance` makes the change when all collisions at this time have been executed, and before
-        kicks at this time. Planned changes are included in the files that `save` writes, in copies
-        and in pickles.
+        `advance` makes the change after all collisions, but before kicks, at this time. Scheduled
+        changes are included in the files that `save` writes, in copies and in pickles.
 
         Parameters
         ----------
         time : float
-            when the change takes place: time since the start of the run, later than the present
-            time
+            time of the change, counted from the start of the run and later than the present time
         values : mapping of str to object
             new values, as for `change`
 
@@ -443,7 +443,7 @@ class Simulation(State):
         Raises
         ------
         ProgramError
-            if a variable cannot be changed, or the time has passed; nothing is then planned
+            if a variable cannot be changed, or the time has passed; nothing is then scheduled
 
         Examples
         --------
@@ -472,7 +472,7 @@ class Simulation(State):
 
 
 def whole_limit(name: str, limit: float) -> int:
-    """Return a limit of a number of events; raise an error if the limit is not a whole number."""
+    """Return a limit of the number of events; raise ValueError unless it is a whole number."""
     if limit == math.inf:
         return NEVER
     if isinstance(limit, float | np.floating) and not float(limit).is_integer():
@@ -481,7 +481,7 @@ def whole_limit(name: str, limit: float) -> int:
 
 
 def restored(kind: type[Simulation], data: bytes, start_energy: float) -> Simulation:
-    """Return the simulation whose checkpoint `data` was stored in a pickle."""
+    """Return the simulation whose checkpoint `data` was pickled."""
     with tempfile.TemporaryDirectory(prefix="ricochet-") as folder:
         path = Path(folder) / "state.h5.part"
         path.write_bytes(data)

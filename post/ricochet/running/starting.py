@@ -1,4 +1,4 @@
-"""Starting files: text files with arrays of disks, which the variable `species.file` names."""
+"""Initial-configuration files: text files with arrays of disks, named by `species.file`."""
 
 import functools
 import itertools
@@ -12,20 +12,21 @@ from numpy.typing import ArrayLike
 
 from ..reading.files import TemporaryFolder, destination
 
-SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as read by the program
+SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as the program reads it
 
-#: Columns of a starting file whose names differ from the names of the arrays.
+#: Columns of an initial-configuration file that are named differently from the arrays.
 TURNING = {"angular_velocity": "omega", "orientation": "angle"}
 
-#: Variables of a species, except position and velocity, that may have a value for each disk.
+#: Variables of a species, besides position and velocity, that may differ from disk to disk.
 PER_DISK = ("radius", "mass", "angular_velocity", "orientation")
 NUMBERS = itertools.count(1)
 
 
 def with_start(group: Mapping[str, Any], place: Path | None) -> Mapping[str, Any]:
-    """Write the arrays of a species to a starting file; return a species that names this file.
+    """Return a species whose arrays have been written to an initial-configuration file.
 
-    Its path begins with `place`; if that is None, it exists until this process ends.
+    The path of the file begins with `place`; if that is None, the file exists until this process
+    ends.
     """
     columns = {name: group[name] for name in PER_DISK if np.size(group.get(name, 0)) > 1}
     if not columns:
@@ -61,16 +62,16 @@ def write_start(
     angular_velocity: ArrayLike | None = None,
     orientation: ArrayLike | None = None,
 ) -> Path:
-    """Write a starting file, which the variable `file` of a species in an input can name.
+    """Write an initial-configuration file, which `species.file` in an input can name.
 
-    The input determines quantities that the file does not contain. Numbers have 17 significant
-    digits, so that they are read exactly. `write_start("bed.txt", **np.load("a.npz"))` converts a
-    NumPy file.
+    The input determines all quantities that the file lacks. Numbers have 17 significant digits and
+    are therefore read back exactly. `write_start("bed.txt", **np.load("a.npz"))` converts a NumPy
+    file.
 
     Parameters
     ----------
     path : str or Path
-        the text file to write
+        text file to write
     position : array_like
         (N, 2) [length]
     velocity : array_like, optional
@@ -78,19 +79,19 @@ def write_start(
     radius, mass : array_like, optional
         (N,), or one value for all disks
     species : array_like, optional
-        (N,), or one value for all disks: names, or numbers in the input from 1
+        (N,), or one value for all disks: names, or positions in the input, counted from 1
     angular_velocity, orientation : array_like, optional
         (N,), or one value for all disks [1/time], [rad]
 
     Returns
     -------
     Path
-        the path of the file
+        path of the file
 
     Raises
     ------
     ValueError
-        if an array has a wrong shape or values that are not allowed
+        if an array has a wrong shape, or values that are not allowed
 
     Examples
     --------
@@ -139,7 +140,7 @@ def table(name: str, values: ArrayLike, count: int | None = None, width: int = 0
 
 
 def real_numbers(name: str, values: ArrayLike) -> np.ndarray:
-    """Return an array of real numbers; raise ValueError for other values, also complex numbers."""
+    """Return an array of real numbers; raise ValueError for any others, including complex ones."""
     values = np.asarray(values)
     if values.dtype.kind not in "iuf":
         raise ValueError(f"{name}: not an array of real numbers")
@@ -147,7 +148,7 @@ def real_numbers(name: str, values: ArrayLike) -> np.ndarray:
 
 
 def sized(name: str, values: np.ndarray, count: int) -> np.ndarray:
-    """Return an array of `count` values; a single value is repeated."""
+    """Return an array of `count` values, repeating a single value."""
     if values.ndim == 0:
         return np.full(count, values)
     if len(values) != count or count == 0:

@@ -1,4 +1,4 @@
-"""The present state of a simulation in memory: disks, observables, input values and events."""
+"""Present state of a simulation in memory: disks, observables, input variables and events."""
 
 import ctypes
 import json
@@ -17,8 +17,8 @@ from .engine import ROOM, called, library
 from .session import Session
 from .starting import real_numbers
 
-FASTEST = 1e100  # largest number that is allowed in an input
-#: Type of the elements of each array of a simulation.
+FASTEST = 1e100  # largest number allowed in an input
+#: Element type of each array of a simulation.
 COLUMNS = {
     "position": float,
     "velocity": float,
@@ -46,7 +46,7 @@ class State(Session):
 
     @property
     def changes(self) -> list[tuple[float, str, str]]:
-        """Time, name of the variable, and new value of each change during the simulation."""
+        """Time, variable and new value of each change during the simulation."""
         found = changes_in(self._text("changes"))
         return [(time, name, value) for time, name, value in found]
 
@@ -60,7 +60,7 @@ class State(Session):
             for group in groups:
                 place = place.setdefault(group, {})
             place[name] = value
-        for group in {"obstacle", "wall"} & found.keys():  # the file contains them as columns
+        for group in {"obstacle", "wall"} & found.keys():  # the output file stores them as columns
             rows = list(found[group].values())
             found |= geometry_of(group, rows)
             names = dict.fromkeys(name for row in rows for name in row)  # keeps the order
@@ -72,13 +72,13 @@ class State(Session):
         return found
 
     def _values(self) -> dict[str, Any]:
-        """Return the values of all variables that have a value; each key is GROUP.NAME.VARIABLE."""
+        """Return the values of all variables that have one, by GROUP.NAME.VARIABLE."""
         lines = (line.split(" = ", 1) for line in self._text("parameters").splitlines())
         return {name: json.loads(text) if ", ... " not in text else text for name, text in lines}
 
     @property
     def nature(self) -> Nature:
-        """Physical properties that the simulation has had so far; see `ricochet.nature`."""
+        """Traits of the simulation so far; see `ricochet.nature`."""
         energy = self.observable("all/kinetic_energy") * self.n_disks
         lost = self.observable("dissipated_energy")
         return nature_of(
@@ -109,7 +109,7 @@ class State(Session):
 
     @property
     def collisions(self) -> int:
-        """Number of collisions between disks since the start."""
+        """Number of disk-disk collisions since the start."""
         return self._counts()[1]
 
     @property
@@ -118,7 +118,7 @@ class State(Session):
         return self._counts()[2]
 
     def _column(self, name: str) -> np.ndarray:
-        """Return a read-only copy of an array in `COLUMNS`; disks are in the order of the input."""
+        """Return a read-only copy of an array in `COLUMNS`, in the order of the input."""
         values = np.empty((self.n_disks, 2))
         with self._open() as handle:
             width = library().ricochet_column(handle, name.encode(), values.ctypes.data)
@@ -131,8 +131,9 @@ class State(Session):
     def position(self) -> np.ndarray:
         """Positions of the disks, (N, 2) [length], as a read-only copy.
 
-        They are inside the box along periodic axes. All can be set at once if no disks then
-        overlap; the change of the total energy is added to the observable `work`.
+        Along periodic axes they are inside the box. All of them can be set at once, provided that
+        no disks overlap afterwards; the change of the total energy is added to the observable
+        `work`.
         """
         return self._column("position")
 
@@ -145,7 +146,8 @@ class State(Session):
     def velocity(self) -> np.ndarray:
         """Velocities of the disks, (N, 2) [length/time], as a read-only copy.
 
-        All can be set at once; the change of the total energy is added to the observable `work`.
+        All of them can be set at once; the change of the total energy is added to the observable
+        `work`.
         """
         return self._column("velocity")
 
@@ -158,7 +160,7 @@ class State(Session):
         array = np.ascontiguousarray(real_numbers(name, value), dtype=float)
         if array.shape != (self.n_disks, 2):
             raise ValueError(f"{name}: has the shape {array.shape}, not ({self.n_disks}, 2)")
-        present = getattr(self, "present", None)  # which closed systems lack
+        present = getattr(self, "present", None)  # missing in closed systems
         inside = slice(None) if present is None else present.astype(bool)
         if not np.abs(array[inside]).max(initial=0) < FASTEST:
             raise ValueError(f"{name}: has values that are not below {FASTEST:g}")
@@ -167,12 +169,12 @@ class State(Session):
 
     @property
     def angular_velocity(self) -> np.ndarray:
-        """Angular velocities, (N,) [1/time]; raises AttributeError if the disks cannot rotate."""
+        """Angular velocities, (N,) [1/time]; AttributeError if the disks cannot rotate."""
         return self._column("angular_velocity")
 
     @property
     def orientation(self) -> np.ndarray:
-        """Angles of the disks from the x axis, (N,) [rad], not reduced modulo 2 pi.
+        """Angles between disks and the x axis, (N,) [rad], not reduced modulo 2 pi.
 
         AttributeError is raised if the disks have no orientations.
         """
@@ -180,7 +182,7 @@ class State(Session):
 
     @property
     def image(self) -> np.ndarray:
-        """Image counters (N, 2): box lengths to add to a position for a continuous path.
+        """Image counters (N, 2): the box lengths to add to a position for a continuous path.
 
         AttributeError is raised if no side is periodic.
         """
@@ -188,18 +190,18 @@ class State(Session):
 
     @property
     def present(self) -> np.ndarray:
-        """1 for each disk in the box and 0 for each disk outside, (N,).
+        """1 for disks in the box and 0 for disks outside, (N,).
 
-        Positions, velocities and angles of disks outside are NaN, and ignored when they are set.
+        Positions, velocities and angles of disks outside are NaN, and are ignored when set.
         AttributeError is raised if no disk can leave or enter the box.
         """
         return self._column("present")
 
     @property
     def recycled(self) -> np.ndarray:
-        """Number of times that each disk has been recycled, (N,).
+        """Number of times each disk has been recycled, (N,).
 
-        AttributeError is raised if the driving does not recycle disks.
+        AttributeError is raised unless the driving recycles disks.
         """
         return self._column("recycled")
 
@@ -215,7 +217,7 @@ class State(Session):
 
     @property
     def species(self) -> np.ndarray:
-        """Number of the species of each disk, (N,), counted from 1 in the order of the input."""
+        """Index of the species of each disk, (N,), counted from 1 in the order of the input."""
         return self._column("species")
 
     def _observed(self) -> dict[str, np.ndarray]:
@@ -251,12 +253,12 @@ class State(Session):
         Returns
         -------
         float, int or numpy.ndarray
-            a number, or an array of the components
+            a number, or an array of components
 
         Raises
         ------
         RunError
-            if no observable has that name
+            if there is no observable of this name
 
         Examples
         --------
@@ -280,12 +282,12 @@ class State(Session):
         Returns
         -------
         list of tuple
-            time, i and j of each event, with i and j as in `EventLog`
+            time, i and j of each event (see `EventLog`)
 
         Raises
         ------
         RunError
-            if the simulation is time-stepped, so that events cannot be predicted
+            if the simulation is time-stepped, because events cannot then be predicted
 
         Examples
         --------
@@ -302,14 +304,14 @@ class State(Session):
         return [(float(t), int(i), int(j)) for t, i, j in records[:n, :3]]
 
     def _last_events(self, most: int) -> np.ndarray:
-        """Return an array (E, 6): time, i, j, impulse and momentum change of the latest events."""
+        """Return time, i, j, impulse and momentum change (E, 6) of the latest events."""
         records = np.empty((most, 6))
         with self._open() as handle:
             n = library().ricochet_last_events(handle, most, records.ctypes.data)
         return records[:n]
 
     def event_log(self, most: int) -> EventLog:
-        """Return the latest events in chronological order, of which the engine stores a million.
+        """Return the latest events in chronological order; the engine stores a million of them.
 
         Parameters
         ----------
@@ -319,7 +321,7 @@ class State(Session):
         Returns
         -------
         EventLog
-            times, numbers of the disks, and impulses of E events
+            times, ids of the disks, and impulses of E events
 
         Raises
         ------
