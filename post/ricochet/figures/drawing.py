@@ -1,6 +1,7 @@
 """Draw disks, walls and obstacles to scale with Matplotlib, and save figures.
 
-In a notebook, `plt.style.use(drawing.STYLE)` selects the style that the scripts use for figures.
+In a notebook, `plt.style.use(drawing.STYLE)` selects the style of the figures that the scripts
+draw.
 """
 
 from collections.abc import Sequence
@@ -29,11 +30,11 @@ from ..reading.reader import SIDES, Run
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
-LEAST_SHARE = 0.12  # smallest drawn diameter divided by the mean distance of disks
-OUTLINE = 0.08  # width of an outline divided by the diameter
-LEAST_POINTS = 4.0  # largest drawn diameter of enlarged disks
-ARC_POINTS = 181  # points of the line that represents an arc
-# Not moved to whole pixels: a straight wall would have a step where an arc begins.
+LEAST_SHARE = 0.12  # smallest diameter drawn, relative to the mean distance between disks
+OUTLINE = 0.08  # width of an outline, relative to the diameter
+LEAST_POINTS = 4.0  # largest diameter to which small disks are enlarged
+ARC_POINTS = 181  # points of the polyline that represents an arc
+# Not snapped to whole pixels, because a straight wall would then have a step where an arc begins.
 WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2, "snap": False}
 
 #: Quantities that can determine the colours of disks, each with its label and its dimension.
@@ -47,7 +48,7 @@ COLOURINGS = {
 
 
 def caption(runs: list[Run]) -> str:
-    """Return a caption with the number of disks, contact law, seeds, and differing parameters."""
+    """Return a caption with number of disks, contact law, seeds, and the parameters that differ."""
     parts = [f"N = {listed({run.n_disks for run in runs})}"]
     restitutions = {run.restitution for run in runs}
     if all(map(np.isfinite, restitutions)):
@@ -70,7 +71,7 @@ def caption(runs: list[Run]) -> str:
 
 
 def stated(name: str, values: set[float]) -> str:
-    """Return the values of a parameter as text; an event-driven run has no time step."""
+    """Return the values of a parameter as text, with "event-driven" for a time step of 0."""
     steps = values - {0.0} if name == "dt" else values
     parts = ["event-driven"] * (steps != values) + [f"{name} = {listed(steps)}"] * bool(steps)
     return " and ".join(parts)
@@ -79,7 +80,7 @@ def stated(name: str, values: set[float]) -> str:
 def by_chance(runs: list[Run]) -> set[str]:
     """Return the names of packing fractions that differ only because radii are random.
 
-    Their species have the same number of disks, mean radius and region.
+    This is the case for species with the same number of disks, mean radius and region.
     """
     given: dict[str, set[tuple[bool, str]]] = {}
     for run in runs:
@@ -94,7 +95,7 @@ def by_chance(runs: list[Run]) -> set[str]:
 def count_at(run: Run, frame: int) -> dict[str, int]:
     """Return the number of events or collisions before a frame, by its name, if it is known.
 
-    It is unknown if the number of frames shows that the schedule was changed during the run.
+    It is unknown if the number of frames shows that the sampling schedule changed during the run.
     """
     schedule = run.parameters.get("output", {})
     counted = {"events": ["collisions", "side_collisions", "obstacle_collisions"]}
@@ -108,13 +109,13 @@ def count_at(run: Run, frame: int) -> dict[str, int]:
 
 
 def moment(run: Run, frame: int) -> str:
-    """Return the title of a panel: the number of events or collisions (if known), and the time."""
+    """Return the title of a panel: the number of events or collisions, if known, and the time."""
     counts = [f"{name[:-1]} {number},  " for name, number in count_at(run, frame).items()]
     return "".join(counts) + f"t = {run.time[frame]:.4g} {run.units.time}".rstrip()
 
 
 def titled(runs: list[Run]) -> str:
-    """Return the title from the input, if all runs have the same, followed by the caption."""
+    """Return the title given in the input, if it is the same for all runs, and the caption."""
     titles = {str(run.parameter("run", "title", "")) for run in runs}
     return "\n".join(
         filter(None, (*titles, caption(runs)) if len(titles) == 1 else [caption(runs)])
@@ -122,13 +123,13 @@ def titled(runs: list[Run]) -> str:
 
 
 def listed(values: set[float]) -> str:
-    """List up to four numbers as text; list only the extremes of more than four numbers."""
+    """List up to four numbers as text; of more than four, only the extremes."""
     words = [f"{value:g}" for value in sorted(values)]
     return ", ".join(words) if len(words) < 5 else f"{words[0]} to {words[-1]}"
 
 
 def numbers_of(run: Run) -> dict[str, float]:
-    """Return the numerical input parameters that a caption states if runs differ in them."""
+    """Return the numerical input variables that a caption states if runs differ in them."""
     found = {**run.parameters.get("box", {}), **run.parameters.get("contact", {})}
     if found.get("wall_restitution") == run.restitution:
         del found["wall_restitution"]
@@ -149,14 +150,14 @@ def numbers_of(run: Run) -> dict[str, float]:
 
 
 def colours(count: int, first: int = 0) -> list[str]:
-    """Return `count` colours: from `COLOURS`, starting at `first`, or from a colour map."""
+    """Return `count` colours, from `COLOURS` starting at `first`, or else from a colour map."""
     if first + count <= len(COLOURS):
         return COLOURS[first : first + count]
     return [to_hex(colour) for colour in plt.get_cmap()(np.linspace(0, 0.9, count))]
 
 
 def panel_grid(count: int, aspect: float) -> tuple[int, int]:
-    """Return numbers of rows and columns for `count` panels with height / width = `aspect`."""
+    """Return the numbers of rows and columns for `count` panels with height / width = `aspect`."""
     columns = int(np.clip(np.ceil(np.sqrt(count * aspect * 1.4)), 1, count))
     rows = int(np.ceil(count / columns))
     return rows, int(np.ceil(count / rows))
@@ -182,21 +183,23 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
     """Return the upper end of the colour scale of a film: the 99.5 % quantile of the values.
 
-    It is that of about 40 frames, or of the last frame for displacements, which grow with time.
+    The values are those in about 40 frames, or, for displacements, which grow with time, in the
+    last.
     """
     return top_of(sample_of(run, frames, colour))
 
 
 def sample_of(run: Run, frames: Sequence[int], colour: str) -> np.ndarray:
-    """Return the values (F, N) in the frames from which `scale_top` finds a colour scale."""
+    """Return the values (F, N) in the frames on which `scale_top` bases a colour scale."""
     some = [] if colour == "displacement" else frames[:: max(1, len(frames) // 40)]
     return values_of(run, sorted({*some, frames[-1]}), colour)
 
 
 def top_of(values: np.ndarray) -> float:
-    """Return the upper end of a colour scale: the 99.5 % quantile of the absolute values except 0.
+    """Return the upper end of a colour scale: the 99.5 % quantile of the nonzero absolute values.
 
-    If these are equal, it is twice their value: the lightest colour is hardly visible on white.
+    If these are all equal, it is twice their value, because the lightest colour is hardly visible
+    on white.
     """
     moved = np.abs(values[(values != 0) & np.isfinite(values)])
     if len(moved) == 0:
@@ -206,23 +209,23 @@ def top_of(values: np.ndarray) -> float:
 
 
 def exceeded(values: np.ndarray, low: float, top: float) -> str:
-    """Return at which ends of a colour scale some values are beyond it, as for `colorbar`."""
+    """Return the ends of a colour scale that values exceed, as `colorbar` expects it."""
     ends = bool(np.any(values < low)), bool(np.any(values > top))
     return {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[ends]
 
 
 def limits_of(colour: str, top: float) -> tuple[float, float]:
-    """Return the lower and the upper end of a linear colour scale with the largest value `top`."""
+    """Return both ends of a linear colour scale with the largest value `top`."""
     return {"psi6": (-180.0, 180.0), "spin": (-top, top)}.get(colour, (0.0, top))
 
 
 def colour_map(colour: str) -> str:
-    """Return the name of the colour map, which is cyclic for angles and diverging for spins."""
+    """Return the name of the colour map, cyclic for angles and diverging for spins."""
     return {"psi6": "hsv", "spin": "coolwarm"}.get(colour, "viridis")
 
 
 def chosen_colour(run: Run, wish: str | None) -> str:
-    """Return the quantity that colours show, which is `wish` or, for None, the default quantity."""
+    """Return the quantity that colours represent: `wish`, or the default if it is None."""
     known = ("species", *COLOURINGS)
     if wish is not None and wish not in known:
         hint = did_you_mean(wish, known)
@@ -239,22 +242,22 @@ def chosen_colour(run: Run, wish: str | None) -> str:
 
 
 def aspect_of(run: Run) -> float:
-    """Return the ratio of height to width of the box including its moving sides."""
+    """Return height / width of the region that the box covers with its moving sides."""
     width, height = run.bounds[1] - run.bounds[0]
     return height / width
 
 
 def lone(x: np.ndarray) -> dict[str, Any]:
-    """Return the style of a curve with the abscissas `x`; a curve of one point has a marker."""
+    """Return the style of a curve with the abscissas `x`, with a marker for a single point."""
     return {"marker": "o", "ms": 3, "clip_on": False} if len(x) < 2 else {}
 
 
 def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
-    """Draw the sides of the box, the walls and the obstacles, with equal scales of both axes.
+    """Draw the sides of the box, the walls and the obstacles, with equal scales on both axes.
 
-    Periodic sides are dashed, open sides dotted, circles grey, thermal and sliding walls labelled.
-    Moving sides are at their positions at `time` [mean positions], and the area beyond them is
-    grey.
+    Periodic sides are dashed, open sides dotted and circles grey; thermal and sliding walls are
+    labelled. Moving sides are drawn at their positions at `time` [mean positions], with the area
+    beyond them in grey.
     """
     low, high = run.bounds
     (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.corners_at(time)
@@ -289,7 +292,7 @@ def draw_circles(axes: Axes, run: Run, grey: dict[str, Any]) -> None:
     circles = [obstacle for obstacle in run.obstacles if not obstacle.is_arc]
     if any(circle.inside for circle in circles):
         axes.add_patch(Rectangle((run.lower[0], run.lower[1]), *run.edges, zorder=0, **grey))
-    width = min(1.0, 20 / np.sqrt(max(len(circles), 1)))  # thin for many circles
+    width = min(1.0, 20 / np.sqrt(max(len(circles), 1)))  # thin if there are many circles
     centres = np.array([circle.centre for circle in circles]).reshape(-1, 2)
     radii = np.array([circle.radius for circle in circles])
     encloses = np.array([circle.inside for circle in circles], dtype=bool)
@@ -300,7 +303,7 @@ def draw_circles(axes: Axes, run: Run, grey: dict[str, Any]) -> None:
             at, reach = centres + shift, radii[:, np.newaxis]
             seen = (at + reach >= run.lower) & (at - reach <= run.upper)
             shown = seen.all(axis=1) & (encloses == inside)
-            sizes = 2 * radii[shown]  # 100 000 circles in a second
+            sizes = 2 * radii[shown]  # draws 100 000 circles in a second
             style |= {"offsets": at[shown], "offset_transform": axes.transData, "units": "xy"}
             axes.add_collection(EllipseCollection(sizes, sizes, np.zeros(1), **style))
 
@@ -313,7 +316,7 @@ def name_walls(axes: Axes, run: Run) -> None:
     shown: list[Any] = [*zip(run.sides, ends_of, strict=True)]
     walls = rows_of(run.parameters.get("wall", {}))
     groups = groups_of_rows(run.parameters, "wall")
-    firsts = np.unique(groups, return_index=True)[1]  # label one wall of each polyline or file
+    firsts = np.unique(groups, return_index=True)[1]  # label only one wall of each polyline or file
     shown += [(walls[groups[k]], (*run.walls[k], 1)) for k in firsts]
     for own, (start, end, side) in shown:
         speed = own.get("surface_velocity", 0.0)
@@ -335,7 +338,7 @@ def name_walls(axes: Axes, run: Run) -> None:
 
 
 def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return indices and positions of all disks in the box, and of images that overlap the box."""
+    """Return indices and positions of all disks in the box and of images that overlap it."""
     which = [np.flatnonzero(np.isfinite(position).all(axis=1))]
     places = [position[which[0]]]
     for shift in periods(run):
@@ -350,7 +353,7 @@ def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def points_per_length(axes: Axes) -> float:
-    """Return the number of points on paper per unit of length, for axes with equal scales."""
+    """Return the number of typographic points per unit of length, for equal scales of both axes."""
     (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
     pixels = min(axes.bbox.width / (x1 - x0), axes.bbox.height / (y1 - y0))
     figure = axes.get_figure(root=True)
@@ -365,16 +368,16 @@ def drawn_diameters(axes: Axes, run: Run) -> np.ndarray:
 
 
 def note_on_size(axes: Axes, run: Run) -> str:
-    """Return a note for a title if disks are enlarged, otherwise an empty text."""
+    """Return a note for a title if disks are enlarged, otherwise ''."""
     larger = drawn_diameters(axes, run) > 2 * run.radius
     return ", small disks enlarged" if larger.any() else ""
 
 
 def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
-    """Draw disks at `position` (N, 2), and their periodic images, with enlarged small disks.
+    """Draw disks at `position` (N, 2) with their periodic images, enlarging small disks.
 
-    `array` (N,) contains values for a colour map, or `facecolors` the colours. With values, all
-    species except the first have a black outline inside the disk.
+    `array` (N,) holds values for a colour map, or `facecolors` the colours. With values, the disks
+    of all species but the first have a black outline inside their rim.
     """
     which, places = with_images(run, position)
     diameters = drawn_diameters(axes, run)
@@ -382,7 +385,8 @@ def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) ->
     if "array" in style and len(run.names) > 1:
         widths = np.clip(OUTLINE * diameters * points_per_length(axes), 0, 1.5)
         widths = (widths * (run.species > 1))[which]
-        size = size - widths / points_per_length(axes)  # half of an outline is outside its ellipse
+        # half of an outline lies outside its ellipse
+        size = size - widths / points_per_length(axes)
         style = {"edgecolors": "black", "linewidths": widths, **style}
     for name in style.keys() & {"array", "facecolors"}:
         style[name] = np.asarray(style[name])[which]
@@ -393,7 +397,7 @@ def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) ->
 
 
 def radius_marks(axes: Axes, run: Run, frame: int) -> LineCollection | None:
-    """Draw the orientation of each disk as a radius; return None if there are no orientations."""
+    """Mark the orientation of each disk by a radius; return None if disks have no orientations."""
     if "orientation" not in run.disk_data:
         return None
     which, places = with_images(run, run.position[frame])
@@ -420,24 +424,24 @@ def bars(axes: Axes, height: Estimate, bins: np.ndarray, **style: Any) -> None:
 
 
 def noise_band(axes: Axes, count: int, colour: str, label: str = "") -> None:
-    """Draw the band that contains a2 of `count` Maxwellian speeds with a probability of 95 %."""
+    """Draw the band that contains a2 of `count` Maxwellian speeds with 95 % probability."""
     reach = 2 * kurtosis_noise(count)
     axes.axhspan(-reach, reach, color=colour, alpha=0.15, lw=0, zorder=0, label=label)
 
 
 def dilute_limit(axes: Axes, points: np.ndarray, of: str = "") -> None:
-    """Draw points (P, 2) of a solution of the Boltzmann equation as open circles."""
+    """Plot a solution of the Boltzmann equation as open circles (points: shape (P, 2))."""
     label = f"{of}dilute limit (Boltzmann equation)"
     axes.plot(*points.T, ls="", marker="o", mfc="none", color="black", label=label)
 
 
 def species_colours(run: Run) -> list[str]:
-    """Return a colour for each disk, which is the colour of its species."""
+    """Return the colour of the species of each disk."""
     return [COLOURS[(s - 1) % len(COLOURS)] for s in run.species]
 
 
 def species_legend(figure: Figure, run: Run, by_outline: bool = False) -> None:
-    """Add a legend below all panels if there are several species, by colour or `by_outline`."""
+    """Add a legend of the species (if several) below all panels, by colour or `by_outline`."""
     styles = [{"color": COLOURS[k % len(COLOURS)]} for k in range(len(run.names))]
     if by_outline:
         styles = [{"mfc": "0.8", "mec": "black", "mew": 1.5 * (k > 0)} for k in range(len(styles))]
@@ -462,7 +466,7 @@ def warn(figure: Figure, notes: Sequence[str]) -> None:
 
 
 def save(figure: Figure, path: Path, runs: list[Run], title: str) -> None:
-    """Write a figure to a file whose metadata name the runs; create missing folders."""
+    """Save a figure with metadata that name the runs, creating missing folders."""
     sources = ", ".join(run.path.name for run in runs[:20]) + (", ..." if len(runs) > 20 else "")
     commits = sorted({str(run.provenance.get("git_commit", "unknown")) for run in runs})
     origin = f"{sources} (ricochet {', '.join(commits)})"

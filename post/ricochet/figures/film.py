@@ -1,4 +1,4 @@
-"""Films of runs in notebooks; a film is an interactive HTML page."""
+"""Films of runs in notebooks, each an interactive HTML page."""
 
 import html
 from pathlib import Path
@@ -12,17 +12,17 @@ from .web_page import page
 
 
 def whole(run: Run, colour: str | None = None) -> str:
-    """Return the page with a film of the whole run, of as many frames as fit into it."""
+    """Return the page with a film of the whole run, with as many frames as fit into it."""
     count = min(run.n_frames, frames_that_fit(run, ROOM))
     frames = np.linspace(0, run.n_frames - 1, count).round().astype(int).tolist()
     return page(run, texts(*film(run, frames, chosen_colour(run, colour), [], ROOM)))
 
 
 class Film:
-    """Film of a run, which a notebook displays, and which `save` writes to a file."""
+    """Film of a run, displayed by a notebook or written to a file by `save`."""
 
     def __init__(self, run: Run, colour: str | None = None, height: int = 700):
-        """Make a film with a height in pixels, whose colours show the quantity `colour`."""
+        """Make a film in which colours represent the quantity `colour`, `height` pixels high."""
         self.page, self.height = whole(run, colour), height
 
     def _repr_html_(self) -> str:
@@ -30,5 +30,5 @@ class Film:
         return f'<iframe title="a film" style="{style}" srcdoc="{html.escape(self.page)}"></iframe>'
 
     def save(self, path: str | Path) -> None:
-        """Write the film to an HTML file, which any browser displays."""
+        """Write the film to an HTML file for any browser."""
         Path(path).write_text(self.page, encoding="utf-8")

@@ -17,23 +17,23 @@ from .drawing import COLOURS, label_of, scale_top
 
 SWING = ("amplitude", "period", "phase")  # variables of an oscillating side
 STROKE = ("velocity", "start_time", "end_time")
-JUMPING = {"recycled", "open"}  # traits of runs without displacements
+JUMPING = {"recycled", "open"}  # traits of runs in which displacements are meaningless
 LAWS = ("motion", *SWING, *STROKE, "temperature", "surface_velocity")
-ROOM = 29e6  # largest size of the data of the disks [bytes of base64]
+ROOM = 29e6  # largest size of the per-disk data [bytes of base64]
 TURN = (16 + 8) * 4 / 3  # bytes per velocity change between two frames, and per half of an event
 MOST_FRAMES = 20000
 MOST_RADII = 256  # largest number of different radii in a film
-FEW_DISKS = 20  # most disks to show all digits and next events
-MOST_SAMPLES = 2000  # largest number of samples of a plot
+FEW_DISKS = 20  # largest number of disks shown with all digits and with their next events
+MOST_SAMPLES = 2000  # largest number of samples in a plot
 ENERGIES = ("kinetic", "potential", "rotational")
-MOST_AT_ONCE = 200000  # number of disks, over all frames, that are read together
+MOST_AT_ONCE = 200000  # largest number of disks read at a time, in all frames together
 
 
 def frames_that_fit(run: Run, room: float) -> int:
     """Return the number of frames that fit into a file of the given size.
 
-    A disk needs 16 bits for each component of position and velocity, 8 for its collisions and 32
-    for its angle. Up to half of the file is for the event log.
+    Per disk and frame, 16 bits are needed for each component of position and velocity, 8 for its
+    collisions and 32 for its angle. Up to half of the file is reserved for the event log.
     """
     more = sum(one is not None for one in (run.event_count, run.image, run.recycled))
     more += 4 * ("orientation" in run.disk_data)
@@ -45,19 +45,19 @@ def frames_that_fit(run: Run, room: float) -> int:
 
 
 def quantities(run: Run) -> list[str]:
-    """Return the quantities, other than the species, that colours of disks can show."""
+    """Return the quantities, other than the species, that colours of disks can represent."""
     found = ["speed"] if run.nature & JUMPING else ["speed", "displacement"]
     return found + ["collisions"] * (run.event_count is not None)
 
 
 def in_room(run: Run, place: np.ndarray) -> np.ndarray:
-    """Return positions in units of the visible region, which contains the box at all times."""
+    """Return positions relative to the visible region, which contains the box at all times."""
     lower, upper = run.bounds
     return (place - lower) / (upper - lower)
 
 
 def sides(run: Run) -> list[dict]:
-    """Return the position, motion, temperature and surface velocity of each side of the box."""
+    """Return position, motion, temperature and surface velocity of each side of the box."""
     places = [end[axis] for axis in (0, 1) for end in (run.lower, run.upper)]
     found = [
         {"place": float(side.get("position", at))}
@@ -72,12 +72,12 @@ def sides(run: Run) -> list[dict]:
 
 
 def opening_times(run: Run) -> list[float]:
-    """Return the times of the start and of all changes of the open sides."""
+    """Return the start time and the times at which sides are opened or closed."""
     return [0.0, *(change.time for change in run.changes if change.name.endswith(".open"))]
 
 
 def thinned(count: int, most: int) -> np.ndarray:
-    """Return at most `most` evenly spread integers between 0 and `count` - 1."""
+    """Return at most `most` evenly spaced integers from 0 to `count` - 1."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
@@ -91,11 +91,11 @@ def laws_of(run: Run, group: str) -> list[dict]:
 def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
     """Return the arrays with the data of all disks in each frame.
 
-    Positions are 16-bit integers in units of the visible region, velocities in units of the largest
-    component of the frame; both have full precision for few disks. Numbers of collisions are bytes,
-    of which 255 is `top`. Periods crossed along x and y since the previous frame have four bits
-    each. Recycled disks are counted modulo 256, and disks in the box of an open system are marked
-    by 1.
+    Positions are 16-bit integers relative to the visible region, velocities relative to the largest
+    component in the frame; for few disks both have full precision. Numbers of collisions are bytes,
+    with 255 standing for `top`. Changes of the image counters along x and y since the previous
+    frame have four bits each. The number of times a disk was recycled is stored modulo 256, and in
+    an open system a 1 marks each disk in the box.
     """
     found: dict[str, bytearray] = defaultdict(bytearray)
     at_once = max(1, MOST_AT_ONCE // run.n_disks)
@@ -129,11 +129,11 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
 
 
 def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
-    """Return collisions per disk in each frame and, unless the log is too long, events and paths.
+    """Return collisions per disk up to each frame, and events and paths if the log is not too long.
 
-    An event has a time and two partners. For the paths, the number of velocity changes in each
-    interval between frames is stored, and for each change the disk, the fraction of the interval
-    and the new velocity.
+    An event has a time and two partners. Paths are stored as the number of velocity changes in each
+    interval between frames and, for each change, the disk, the fraction of the interval and the new
+    velocity.
     """
     exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
     try:
@@ -172,7 +172,7 @@ def boundary_names(run: Run, kind: str) -> list[str]:
 
 
 def species(run: Run) -> list[dict]:
-    """Return for each species the properties that are common to all its disks."""
+    """Return the properties that the disks of each species have in common."""
     colours = [c if c != "#000000" else "#8a8a8a" for c in map(to_hex, COLOURS)]
     return [
         {
@@ -196,11 +196,11 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 
 def curves(run: Run) -> dict:
-    """Return the energy of each species and the pressure against time, for small plots.
+    """Return the energy of each species and the pressure as functions of time, for small plots.
 
-    They are those of the observables, which are written more often than frames. Missing values are
-    None, as is the pressure before the first collision. For an open system, there are also the
-    numbers of disks inside, and of those that left and entered so far.
+    They are based on the observables, which are sampled more often than frames. Missing values, and
+    the pressure before the first collision, are None. For an open system, the numbers of disks
+    inside, and of those that have left and entered, are included.
     """
     series, found = {}, {}
     moved = passages(run.observables) if "open" in run.nature else {}
@@ -240,7 +240,7 @@ def curves(run: Run) -> dict:
 
 
 def scene(run: Run) -> tuple[dict, dict]:
-    """Return the constant data of a film: the box, the obstacles, the species and the disks.
+    """Return the constant data of a film: box, obstacles, species and disks.
 
     `run` is a `Run`, or another object with the same attributes.
     """
@@ -269,7 +269,7 @@ def scene(run: Run) -> tuple[dict, dict]:
         "species": species(run),
         "radii": radii.tolist(),
         "surfaces": [
-            *(f"the {side} side" for side in SIDES),  # names of partners j <= 0
+            *(f"the {side} side" for side in SIDES),  # names of the partners j <= 0
             *boundary_names(run, "obstacle"),
             *boundary_names(run, "wall"),
         ],
@@ -289,13 +289,13 @@ def film(
     traced: list[int],
     room: float = ROOM,
 ) -> tuple[dict, dict]:
-    """Return the values and the arrays of a film; each array is stored as bytes."""
+    """Return the values of a film, and its arrays as bytes."""
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
     told, blocks = told_by_log(run, frames, room / 2 // TURN)
     blocks = {name: block.tobytes() for name, block in blocks.items()}
     blocks |= moving(run, frames, tops.get("collisions", 1))
-    # Displacements of disks are measured from the positions in the first frame of the film,
-    # unwrapped across periodic sides (`origin`).  Disks that jump have no displacements.
+    # Displacements are measured from the positions in the first frame of the film, `origin`,
+    # unwrapped across periodic sides. Disks that jump have no displacements.
     origin = run.position[frames[0]]
     if not run.nature & JUMPING:
         origin = run.unwrapped(0) + origin - run.unwrapped(frames[0])

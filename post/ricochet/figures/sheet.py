@@ -1,4 +1,4 @@
-"""Figures of named panels, drawn for a width on paper or for a slide."""
+"""Figures of named panels, drawn for a given width on paper or for a slide."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -16,28 +16,28 @@ from ..reading.files import RunError, did_you_mean
 from .drawing import STYLE
 
 CM = 1 / 2.54  # [inches]
-WIDTH = 16.0  # of the text of an A4 page [cm]
-HIGHEST = 22.0  # figure for a page, which leaves room for a caption on A4 [cm]
-LONGEST = 25.0  # figure of stacked panels [cm]
-LEAST_HEIGHT = 3.5  # of a row of panels with its labels [cm]
-STACKED = 12.0  # panels of a narrower figure stand below each other [cm]
-SLIDE = 4 / 3  # size of text on a slide, divided by its size on paper
-SLIDE_SHAPE = 9 / 16  # height of a slide divided by its width
+WIDTH = 16.0  # width of the text of an A4 page [cm]
+HIGHEST = 22.0  # highest figure that leaves space for a caption on an A4 page [cm]
+LONGEST = 25.0  # highest figure of stacked panels [cm]
+LEAST_HEIGHT = 3.5  # least height of a row of panels with its labels [cm]
+STACKED = 12.0  # width below which panels are stacked [cm]
+SLIDE = 4 / 3  # size of text on a slide, relative to paper
+SLIDE_SHAPE = 9 / 16  # height / width of a slide
 SMALLEST = 8.0  # size of the smallest text [points]
-PAD = 6.0  # distance of a title from its panel [points]
-LINE = 1.35  # distance of lines of text divided by the size of the text
-LETTER = 0.52  # mean width of a letter divided by the size of the text
-HANDLE = 5  # width of the line or symbol of a legend [letters]
+PAD = 6.0  # distance between a title and its panel [points]
+LINE = 1.35  # distance between lines of text, relative to the size of the text
+LETTER = 0.52  # mean width of a letter, relative to the size of the text
+HANDLE = 5  # width of the line or symbol in a legend [letters]
 TOO_LONG = "The figure is higher than a page: --panel NAME draws one panel alone."
 LETTERS = 6.4  # mean number of letters of the smallest text [1/cm]
 
 
 @dataclass(frozen=True)
 class Panel:
-    """Panel of a figure, which `draw(axes, *arguments)` draws.
+    """Panel of a figure, drawn by `draw(axes, *arguments)`.
 
-    `aspect` is the ratio of height to width, `weight` the relative width in a row, and `share_x`
-    and `share_y` name panels of the figure with the same axis.
+    `aspect` is height / width, `weight` the relative width within a row; `share_x` and `share_y`
+    name panels of the figure with which the panel shares an axis.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Panel:
 
 @dataclass
 class Sheet:
-    """Panels in rows, the title above the panels, and a function that adds a common legend."""
+    """Rows of panels, a title above them, and a function that adds a common legend."""
 
     rows: list[list[Panel]]
     title: str = ""
@@ -59,7 +59,7 @@ class Sheet:
     notes: list[str] = field(default_factory=list)  # explanations below the figure
 
     def only(self, name: str) -> "Sheet":
-        """Return a figure of one panel."""
+        """Return a figure that consists of one panel."""
         panels = {panel.name: panel for row in self.rows for panel in row}
         if name not in panels:
             hint = did_you_mean(name, panels) or f"; there are {', '.join(panels)}"
@@ -72,7 +72,7 @@ class Sheet:
         width: float | str | None = None,
         warnings: Sequence[str] = (),
     ) -> Figure:
-        """Draw the figure, or one panel of it, for a width (see `width_of`)."""
+        """Draw the figure, or one panel of it, for a given width (see `width_of`)."""
         size, slide = width_of(width)
         sheet = self.only(panel) if panel else self
         rows = sheet.rows
@@ -84,7 +84,7 @@ class Sheet:
     def drawn(
         self, rows: list[list[Panel]], width: float, shape: float | None, warnings: Sequence[str]
     ) -> Figure:
-        """Draw rows of panels, the title, and notes and warnings below the panels."""
+        """Draw the title, the rows of panels, and below these the notes and warnings."""
         letters = int(width * LETTERS * SMALLEST / plt.rcParams["legend.fontsize"])
         title = [line for part in self.title.split("\n") for line in wrap(part, letters - 4)]
         below = [(line, "0.25") for note in self.notes for line in wrap(note, letters)]
@@ -103,7 +103,7 @@ class Sheet:
             whole += line * len(longer)
         whole = whole if shape is None else max(width * CM * shape, foot + line * 12)
         figure.set_size_inches(width * CM, whole)
-        above = (0, foot / whole, 1, 1 - foot / whole)  # the notes
+        above = (0, foot / whole, 1, 1 - foot / whole)  # above the notes
         layout = ConstrainedLayoutEngine(rect=above)
         figure.set_layout_engine(layout)
         for axes in figure.axes:
@@ -117,15 +117,15 @@ class Sheet:
         for k, (text, colour) in enumerate(reversed(below)):
             figure.text(0.01, (k + 0.4) * line / whole, text, color=colour, fontsize=small)
         if any(axes.get_aspect() != "auto" for axes in figure.axes):
-            # The shape of a panel with equal scales is known only after a layout, and titles would
-            # overlap without a second one, which takes place when the figure is drawn.
+            # The shape of a panel with equal scales is known only after a layout. Drawing the
+            # figure performs a second layout, without which titles would overlap.
             layout.execute(figure)
         return figure
 
     def draw_panels(self, figure: Figure, rows: list[list[Panel]], room: float) -> list[float]:
-        """Draw rows of panels, and return the heights in inches; legends need space.
+        """Draw rows of panels, and return their heights [inches], which legends reduce.
 
-        The highest rows are lower than their panels require if all would not fit in `room`.
+        If not all rows fit into `room`, the highest ones are drawn lower than their panels require.
         """
         alone = all(len(row) == 1 for row in rows)  # one grid aligns the axes of all rows
         parts = figure.add_gridspec(len(rows), 1)
@@ -168,14 +168,14 @@ def legend_above(axes: Axes, **style: Any) -> None:
 
 
 def height_of_legend(axes: Axes) -> float:
-    """Return the height in inches of a legend between a panel and its title."""
+    """Return the height of a legend between a panel and its title [inches]."""
     offset = axes.titleOffsetTrans.get_matrix()[1, 2]  # type: ignore[attr-defined]
     figure = axes.get_figure(root=True)
     return max(0.0, float(offset) / (figure.dpi if figure else 72) - PAD / 72)
 
 
 def wrap(text: str, letters: float) -> list[str]:
-    """Divide a text into lines of about the given number of letters, and no formula."""
+    """Split a text into lines of about the given number of letters, keeping formulas whole."""
     lines: list[str] = []
     for word in re.findall(r"\([^()]*\)\S*|(?:\$[^$]*\$|[^\s$])+", text):
         if lines and letters_of(f"{lines[-1]} {word}") <= letters:
@@ -191,7 +191,7 @@ def letters_of(text: str) -> float:
 
 
 def wrap_labels(figure: Figure, axes: Axes) -> None:
-    """Write a label of an axis that is longer than the axis in several lines."""
+    """Wrap axis labels that are longer than their axis."""
     size = figure.get_size_inches() * axes.get_position().size * 72  # [points]
     for axis, length in zip((axes.xaxis, axes.yaxis), size, strict=True):
         label = axis.get_label()
@@ -200,13 +200,13 @@ def wrap_labels(figure: Figure, axes: Axes) -> None:
 
 
 def height_of(row: Sequence[Panel], width: float) -> float:
-    """Return the height of a row of panels with a total width."""
+    """Return the height of a row of panels of given total width."""
     whole = sum(panel.weight for panel in row)
     return max(panel.aspect * width * panel.weight / whole for panel in row)
 
 
 def largest_height(heights: Sequence[float], room: float) -> float:
-    """Return the largest height of a row for which all rows fit in `room` [inches]."""
+    """Return the largest height of a row for which all rows fit into `room` [inches]."""
     for k, height in enumerate(order := sorted(heights)):
         equal = (room - sum(order[:k])) / (len(order) - k)
         if height >= equal:
@@ -228,21 +228,21 @@ def width_of(text: float | str | None) -> tuple[float, bool]:
 
 
 def sizes_of_text(scale: float) -> dict[str, Any]:
-    """Return the sizes of text in a figure: 9 points on paper, 8 points in legends and at ticks."""
+    """Return the sizes of text in a figure: 9 points on paper, 8 points for legends and ticks."""
     names = "font.size", "axes.labelsize", "axes.titlesize", "figure.titlesize"
     small = "legend.fontsize", "legend.title_fontsize", "xtick.labelsize", "ytick.labelsize"
     return dict.fromkeys(names, 9 * scale) | dict.fromkeys(small, SMALLEST * scale)
 
 
 def warning_lines(warnings: Sequence[str], letters: int) -> list[str]:
-    """Return the lines of at most three warnings, and of the number of further warnings."""
+    """Return the lines of at most three warnings, with the number of the others."""
     lines = [line for text in warnings[:3] for line in wrap(f"Warning: {text}", letters)]
     rest = len(warnings) - 3
     return lines + [f"and {rest} more warning{'s' * (rest > 1)}, as printed"] * (rest > 0)
 
 
 def smallest_text(figure: Figure) -> float:
-    """Return the size in points of the smallest visible text of a figure."""
+    """Return the size of the smallest visible text of a figure [points]."""
     figure.draw_without_rendering()
     texts = [one for one in figure.findobj() if isinstance(one, Text) and one.get_visible()]
     return min(float(text.get_fontsize()) for text in texts if text.get_text())

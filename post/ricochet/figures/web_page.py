@@ -1,4 +1,4 @@
-"""Web pages of films and of the laboratory, made from the parts in the folder `page`."""
+"""Web pages of films and of the laboratory, assembled from the parts in the folder `page`."""
 
 import base64
 import hashlib
@@ -11,7 +11,7 @@ from ..commands import SCRIPTS
 from ..reading.reader import Run
 from .drawing import caption
 
-PAGE = SCRIPTS / "page"  # the parts of the page
+PAGE = SCRIPTS / "page"  # folder of the parts
 INPUTS = SCRIPTS.parent / "input"
 MODULES = ("film", "camera", "stage", "panels", "sliders", "controls")
 MODULES += ("encounter", "stream", "live")
@@ -21,7 +21,7 @@ LAB_MODULES = ("sliders", "values", "lab", "disks", "doors")
 def page(run: Run, film: dict | None) -> str:
     """Return the web page of a film.
 
-    Without `film`, the page requests the film from the server of the option --live.
+    If `film` is None, the page requests the film from the server of the option --live.
     """
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
@@ -35,14 +35,14 @@ def page(run: Run, film: dict | None) -> str:
 
 
 def view() -> str:
-    """Return the page of a film that is a part of the page of the laboratory."""
+    """Return the page of a film that is embedded in the page of the laboratory."""
     return paged(None, dict.fromkeys(("title", "caption", "warning", "source"), ""))
 
 
 def paged(film: dict | None, words: dict[str, str]) -> str:
     """Return a film page with the given texts.
 
-    Without `film`, the page requests the film from its server.
+    If `film` is None, the page requests the film from its server.
     """
     style = text_of("style.css")
     script = "\n".join(text_of(f"{name}.js") for name in MODULES)
@@ -56,7 +56,7 @@ def paged(film: dict | None, words: dict[str, str]) -> str:
 
 
 def lab_page(data: dict) -> str:
-    """Return the page of the laboratory; `data` are the table of input variables and the inputs."""
+    """Return the page of the laboratory; `data` holds the table of variables and the inputs."""
     style = text_of("style.css") + text_of("lab.css")
     script = "".join(text_of(f"{name}.js") for name in LAB_MODULES)
     more = "connect-src 'self'", "img-src data:", "frame-src 'self'"
@@ -65,7 +65,7 @@ def lab_page(data: dict) -> str:
 
 
 def chooser(paths: list[Path]) -> list[dict]:
-    """Return the title, description, sliders and picture of each input file for the laboratory."""
+    """Return title, description, sliders and picture of each input file for the laboratory."""
     known = json.loads((INPUTS / "chooser.json").read_text(encoding="utf-8"))
     found = []
     for path in paths:
@@ -86,13 +86,13 @@ def picture_of(path: Path) -> str:
 
 
 def filled(name: str, fillings: dict[str, str]) -> str:
-    """Return the text of a page after replacing its placeholders."""
+    """Return a page after filling in its placeholders."""
     blank = re.compile("{{(" + "|".join(fillings) + ")}}")
     return blank.sub(lambda found: fillings[found[1]], text_of(name))
 
 
 def text_of(name: str) -> str:
-    """Return the text of a style, script or template file from which pages are made."""
+    """Return the text of a style, script or template from which pages are assembled."""
     return (PAGE / name).read_text(encoding="utf-8")
 
 
@@ -102,7 +102,7 @@ def enclosed(data: object) -> str:
 
 
 def policy(style: str, script: str, *more: str) -> str:
-    """Return a content security policy for one style, one script and the sources `more`."""
+    """Return a content security policy for a style, a script and the further sources `more`."""
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'", *more]
     for tag, own in (("script", script), ("style", style)):
         digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()
