@@ -1,1 +1,1 @@
-"""Web servers and worker processes for the pages that show running simulations."""
+"""Web servers and worker processes of the pages that show running simulations."""

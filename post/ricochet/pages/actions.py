@@ -1,4 +1,4 @@
-"""Actions of the user on the simulation of a page, in words and as a script that repeats them."""
+"""Actions of the user on a simulation, in words and as a script that repeats them."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ DONE_TO_DISK = {"position": "is moved", "velocity": "gets energy", "aim": "gets 
 
 
 def words(what: str, value: object) -> str:
-    """Describe a change by the user that is not the value of an input variable."""
+    """Describe an action of the user other than setting an input variable."""
     if what == "heat":
         return f"all speeds times {value:g}"
     if what == "hold":
@@ -23,7 +23,7 @@ def words(what: str, value: object) -> str:
 
 
 def typical_speed(simulation: Simulation) -> float:
-    """Return the rms speed of the disks in the box, or 1 if no disk in the box moves."""
+    """Return the rms speed of the disks in the box, or 1 if none of them moves."""
     squares = np.sum(simulation.velocity**2, axis=1)
     squares = squares[np.isfinite(squares)]
     return float(np.sqrt(np.sum(squares) / max(len(squares), 1))) or 1.0
@@ -42,7 +42,7 @@ def scale_velocities(simulation: Simulation, factor: float) -> None:
 
 
 def let_in(simulation: Simulation, burst: dict, then: float, usual: dict) -> None:
-    """Let disks enter at the time `then`, and restore the usual variables of the source."""
+    """Let disks enter up to the time `then`; afterwards restore the usual values of the source."""
     simulation.change(burst).advance(time=then).change(usual)
 
 

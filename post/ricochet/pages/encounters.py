@@ -1,4 +1,4 @@
-"""Collisions of a few disks that a page shows, with all velocities before and after each."""
+"""Collisions of a few disks shown on a page, with all velocities before and after each."""
 
 import time
 from collections.abc import Callable
@@ -8,8 +8,8 @@ import numpy as np
 from ..reading.reader import Run
 from ..running.simulation import NEVER, Simulation
 
-MOST_DISKS = 4  # largest number of disks whose collisions are recorded
-MOST_RECORDED = 50  # largest number of collisions that are recorded between two frames
+MOST_DISKS = 4  # largest number of disks for which collisions are recorded
+MOST_RECORDED = 50  # largest number of collisions recorded between two frames
 
 
 def are_recorded(run: Run) -> bool:
@@ -24,13 +24,13 @@ def advance_and_record(
     patience: float,
     record: Callable[[dict], None],
 ) -> bool:
-    """Advance for at most `patience` [s], and call `record` for each collision of two disks.
+    """Advance for at most `patience` [s], calling `record` for each disk-disk collision.
 
-    The engine stops at each event, which changes no bit of the result. The recorded dictionary
-    contains the time, the indices i and j, the velocities of all disks before and after the
-    collision (N, 2), and the speeds of approach and separation. `limits` are a time, a number of
-    collisions and a number of events; the result is True if none is reached. The box has no
-    periodic sides.
+    Stopping the engine at each event does not affect the result, which stays bit-identical. The
+    recorded dictionary holds the time, the indices i and j, the velocities (N, 2) of all disks
+    before and after the collision, and the speeds of approach and separation. `limits` are a time,
+    a number of collisions and a number of events; True is returned if none of them is reached. The
+    box must have no periodic sides.
     """
     deadline, recorded = time.perf_counter() + patience, 0
     end, _, last = limits

@@ -1,7 +1,7 @@
 """Web server of the laboratory, which starts a worker process for each simulation of a page.
 
 Each run and each scan has its own WebSocket and worker process (`ricochet.worker`), which ends when
-the socket is closed. A spare worker is always ready, because Python takes time to start. If the
+the socket is closed. Since Python takes time to start, a spare worker is always kept ready. If the
 server is killed, the operating system ends all workers.
 """
 
@@ -20,24 +20,24 @@ from aiohttp import web
 from ..reading.files import RunError
 from ..running.program import find_program, value_text
 
-RUNS = 24  # largest number of runs of all pages at a time
+RUNS = 24  # largest number of simultaneous runs on all pages
 GRACE = 3.0  # time after which a worker that does not end on request is killed [s]
 ENDED = b"No answer: the laboratory has ended."  # reason for closing a socket, at most 123 bytes
 DIED = b"It has ended: it needs more memory than it may have here (fewer disks do), or was killed."
-NAME = re.compile(r"[\w.-]{1,200}")  # name of a variable or a group
+NAME = re.compile(r"[\w.-]{1,200}")  # name of a variable or group
 
 
 # --- contents of input files ---
 
 
 def printed(*words: str | Path) -> object:
-    """Return the JSON output of the simulation program, without its error messages."""
+    """Return the JSON output of the simulation program, ignoring error messages."""
     done = subprocess.run([find_program(), *words], capture_output=True, text=True, check=False)
     return json.loads(done.stdout or "[]")
 
 
 def form(path: Path) -> dict:
-    """Return the description of an input file, and the values of each group in the file."""
+    """Return the description of an input file and the values of its groups."""
     head = path.read_text(errors="replace").split("\n&")[0]
     groups = [
         {
@@ -64,7 +64,7 @@ class Lab:
     """Server of the laboratory, with the input files, the table of variables, and the workers."""
 
     def __init__(self, inputs: list[Path], folders: list[Path], command: list[str]) -> None:
-        """Store the input files, the folders that they may refer to, and the worker command."""
+        """Store the input files, the folders to which they may refer, and the worker command."""
         self.inputs = {path.stem: path for path in inputs}
         self.folders = [folder.resolve() for folder in folders]
         self.command = command
@@ -88,12 +88,12 @@ class Lab:
         return worker
 
     def prepare(self) -> None:
-        """Start the spare worker process, unless one exists."""
+        """Start the spare worker process, unless it exists."""
         if not (self.spare or self.closed):
             self.spare = asyncio.create_task(self.start_worker())
 
     async def worker(self) -> Process:
-        """Return the spare worker process, and start another spare worker process."""
+        """Return the spare worker process, and start another one."""
         self.prepare()
         task, self.spare = self.spare, None
         if task is None:
@@ -102,11 +102,11 @@ class Lab:
         self.prepare()
         if is_alive(worker):
             return worker
-        self.workers.discard(worker)  # another process has killed it
+        self.workers.discard(worker)  # killed by another process
         return await self.worker()
 
     async def end(self, worker: Process) -> None:
-        """End a worker process, by force if it does not end within `GRACE` seconds."""
+        """End a worker process, by force after `GRACE` seconds."""
         terminate(worker)
         try:
             async with asyncio.timeout(GRACE):
@@ -127,7 +127,7 @@ class Lab:
     # --- runs ---
 
     async def socket(self, request: web.Request) -> web.StreamResponse:
-        """Handle the WebSocket of a run; the run ends when the WebSocket is closed."""
+        """Handle the WebSocket of a run, which ends when the WebSocket is closed."""
         if self.runs >= RUNS:
             raise RunError(f"{RUNS} runs are open, which is the largest number: close a page")
         self.runs += 1
@@ -143,7 +143,7 @@ class Lab:
         return socket
 
     async def pass_requests(self, worker: Process, socket: web.WebSocketResponse) -> None:
-        """Pass requests of a page to its worker process until the WebSocket is closed."""
+        """Pass requests of a page on to its worker process until the WebSocket is closed."""
         answers = asyncio.create_task(self.pass_answers(worker, socket))
         try:
             async for message in socket:
@@ -161,7 +161,7 @@ class Lab:
             answers.cancel()
 
     async def pass_answers(self, worker: Process, socket: web.WebSocketResponse) -> None:
-        """Pass answers of a worker process to its page, and close the WebSocket at the end."""
+        """Pass answers of a worker process on to its page, and finally close the WebSocket."""
         with suppress(asyncio.IncompleteReadError, ConnectionError):
             while True:
                 kind, length = struct.unpack(">cI", await worker.stdout.readexactly(5))
@@ -170,9 +170,9 @@ class Lab:
         await socket.close(message=ENDED if self.closed else DIED)
 
     def allowed(self, query: dict) -> dict:
-        """Check a request of a page, and return it together with the input text.
+        """Check a request of a page, and return it with the text of the input.
 
-        LookupError, TypeError or ValueError is raised if it is malformed.
+        A malformed request raises LookupError, TypeError or ValueError.
         """
         if query["do"] not in ("start", "scan"):
             return query
@@ -191,7 +191,7 @@ class Lab:
         return query | {"text": text}
 
     def allow(self, file: str) -> None:
-        """Raise an error if a file that the input names is outside the allowed folders."""
+        """Raise RunError if the input names a file outside the allowed folders."""
         path = Path(re.fullmatch(r"""(['"]?)([^'"]*)\1""", file.strip())[2]).resolve()
         if not any(path.is_relative_to(folder) for folder in self.folders):
             raise RunError(
@@ -200,19 +200,19 @@ class Lab:
 
 
 async def send(socket: web.WebSocketResponse, message: dict) -> None:
-    """Send a message to a page if the WebSocket is still open."""
+    """Send a message to a page, if its WebSocket is still open."""
     with suppress(ConnectionError):
         await socket.send_json(message)
 
 
 def terminate(worker: Process) -> None:
-    """Ask a worker process to end, after it has removed any temporary file."""
+    """Ask a worker process to remove its temporary files and end."""
     with suppress(ProcessLookupError):
         worker.terminate()
 
 
 def is_alive(worker: Process) -> bool:
-    """Return whether a worker is running; `asyncio` sets its return code with a delay."""
+    """Return whether a worker is running; `asyncio` sets its return code only with a delay."""
     with suppress(ProcessLookupError):
         os.kill(worker.pid, 0)
         return worker.returncode is None

@@ -1,7 +1,7 @@
-"""Web server for browsers on the same computer, and the page that shows an unfinished run.
+"""Web server for browsers on the same computer, and the page of an unfinished run.
 
-Requests from pages of other web sites are refused; they might read data through a host name that is
-resolved to this computer (DNS rebinding).
+Requests from pages of other web sites are refused. Such a page could otherwise read data by means
+of a host name that resolves to this computer (DNS rebinding).
 """
 
 import asyncio
@@ -20,11 +20,11 @@ from ..reading.files import RunError
 from ..reading.reader import Run, read_run
 
 ADDRESS = "127.0.0.1"
-CHECK_INTERVAL = 0.5  # interval at which the server checks if the run has ended [s]
+CHECK_INTERVAL = 0.5  # interval at which the server checks whether the run has ended [s]
 DIED = "was killed or has crashed"
 PATIENCE = 10.0  # time without requests after which the server of an ended run stops [s]
 LONGEST = 1_000_000  # largest request [bytes]
-SILENCE = 5.0  # longest time of a connection before its first request [s]
+SILENCE = 5.0  # longest time between a connection and its first request [s]
 HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -38,7 +38,7 @@ SERVER = web.AppKey("server", dict)
 
 @web.middleware
 async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse:
-    """Refuse every request that does not come from a page of this server or from the user."""
+    """Refuse all requests except those of the user or of a page of this server."""
     port = request.app[SERVER]["port"]
     hosts = {f"{name}:{port}" for name in (ADDRESS, "localhost")}
     if port == 80:
@@ -77,7 +77,7 @@ def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Ap
 
 
 async def close_silent(app: web.Application, server: web.Server) -> None:
-    """Close connections that send no requests, because many of them would exhaust the server."""
+    """Close connections without requests, many of which would exhaust the server."""
     active, clock = app[SERVER]["heard"], asyncio.get_running_loop().time
     since: dict = {}
     while True:
@@ -91,7 +91,7 @@ async def close_silent(app: web.Application, server: web.Server) -> None:
 
 
 async def listen(runner: web.AppRunner, ports: Sequence[int]) -> None:
-    """Listen on the first free port of a list, or raise RunError."""
+    """Listen on the first free port of a list; raise RunError if there is none."""
     for port in ports:
         try:
             await web.TCPSite(runner, ADDRESS, port, backlog=512).start()
@@ -103,9 +103,10 @@ async def listen(runner: web.AppRunner, ports: Sequence[int]) -> None:
 
 @asynccontextmanager
 async def serving(app: web.Application, *ports: int):
-    """Run the server; yield its address and an event that Ctrl-C, TERM and HUP set.
+    """Run the server; yield its address, and an event that is set by Ctrl-C, TERM and HUP.
 
-    It uses the first free port of `ports`, of which 0 is any; RunError is raised if none is free.
+    The first free port of `ports` is used, where 0 stands for any. RunError is raised if none is
+    free.
     """
     for name in ("aiohttp", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # requests are not logged
@@ -139,24 +140,24 @@ def page_of(text: str) -> Callable:
 
 
 class Live:
-    """Film of a run that may still be in progress, and is not disturbed.
+    """Film of a run that may be in progress, which the film does not disturb.
 
     For each request the output file is opened without a lock, and only complete data are read.
     """
 
     def __init__(self, run: Run, make_film: Callable[[Run], dict]) -> None:
-        """Store the run and the function that converts the run to a film."""
+        """Store the run and the function that converts it to a film."""
         self.final = run.path.with_suffix("") if run.path.suffix == ".part" else run.path
         self.part, self.make_film = Path(f"{self.final}.part"), make_film
         self.lock_file = Path(f"{self.final}.lock")  # held by the program while it writes
         self.lock = threading.Lock()
         self.stamp, self.body = "", b""
-        self.last_request = -PATIENCE  # time of the last request of a page
+        self.last_request = -PATIENCE  # time of the last request
         self.delivered = False  # whether a page has received the end
 
     @property
     def end(self) -> str:
-        """Reason why the run has ended; empty while the run continues."""
+        """Reason why the run has ended; empty while it continues."""
         if not self.part.exists():
             return "has ended" if self.final.exists() else ""
         if abandoned(self.lock_file):
@@ -164,11 +165,11 @@ class Live:
         return "" if self.lock_file.exists() else "has stopped"
 
     def answer(self, known: str) -> tuple[bytes, bool]:
-        """Return the film (empty if the page has the newest one), and whether the run has ended."""
+        """Return the film, empty if the page has the latest one, and whether the run has ended."""
         with self.lock:
             end = self.end
-            # If a request fails because the simulation program is renaming the file, the next
-            # request will succeed.
+            # A request may fail while the simulation program renames the file; the next one will
+            # succeed.
             with suppress(RunError, FileNotFoundError):
                 run = read_run(self.part if self.part.exists() else self.final)
                 stamp = f"{run.n_frames} {end}"
@@ -180,22 +181,23 @@ class Live:
             return b"" if known == self.stamp else self.body, ends
 
     async def film(self, request: web.Request) -> web.StreamResponse:
-        """Answer a request of a page for the newest film."""
+        """Answer a request of a page for the latest film."""
         self.last_request = asyncio.get_running_loop().time()
         body, ends = await asyncio.to_thread(self.answer, request.query.get("known", ""))
         response = web.Response(body=body, content_type="application/json")
         await response.prepare(request)
         await response.write_eof()
-        self.delivered = self.delivered or ends  # set after sending, as it stops the server
+        # set only after sending, because it stops the server
+        self.delivered = self.delivered or ends
         return response
 
 
 def abandoned(lock: Path) -> bool:
     """Return whether the program was killed, so that no process holds a lock on its lock file.
 
-    Without locks in the file system, the result is False.
+    On a file system without locks the result is False.
     """
-    import fcntl  # imported here because it does not exist on Windows, where files can be read
+    import fcntl  # not at the top: Windows, where files can be read, has no such module
 
     try:
         descriptor = os.open(lock, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
@@ -216,7 +218,7 @@ def serve(
     make_film: Callable[[Run], dict],
     open_page: Callable[[str], object] | None = None,
 ) -> str:
-    """Show a run until it ends or Ctrl-C or TERM arrives, and return why the server stopped.
+    """Show a run until it ends or Ctrl-C or TERM arrives; return why the server stopped.
 
     `open_page` is called with the address of the page. RunError is raised if the file cannot be
     shown, or if the simulation program was killed.

@@ -1,4 +1,4 @@
-"""Numbers that the laboratory shows: the state of a simulation, means with errors, theory."""
+"""Numbers shown in the laboratory: the state of a simulation, means with errors, theory."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ POINTS = 200  # largest number of samples from which a decay time is determined
 
 @dataclass(frozen=True)
 class SnapshotRun(Run):
-    """Present state of a simulation, in the form of a run with one frame and its observables."""
+    """Present state of a simulation in the form of a run with one frame and its observables."""
 
     simulation: Simulation
 
@@ -45,7 +45,7 @@ class SnapshotRun(Run):
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners of the box, with an additional margin at each side that is a piston."""
+        """Corners of the box, with an additional margin beyond each piston."""
         way = np.zeros(4)
         way[[*self.piston_positions]] = PISTON_MARGIN * self.edges.max()
         lower, upper = Run.bounds.func(self)
@@ -91,7 +91,7 @@ def snapshot_run(simulation: Simulation) -> SnapshotRun:
 
 
 def observed(simulation: Simulation) -> dict[str, float]:
-    """Return the time and the present observables; vectors are represented by one component."""
+    """Return the time and the present observables, with only one component of each vector."""
     seen = simulation._observed().items()
     return {name: part[0].item() for name, part in seen} | {"time": simulation.time}
 
@@ -99,7 +99,7 @@ def observed(simulation: Simulation) -> dict[str, float]:
 def sampled(count: int, value: dict) -> tuple[float, ...]:
     """Return the quantities from which means are computed: time, energy, virial, area.
 
-    The energy is that of all `count` disks or, in an open system, of the disks inside.
+    The energy is that of all `count` disks or, in an open system, of the disks in the box.
     """
     time, mean, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
     kinetic = mean * inside if (inside := value.get("inside", count)) else 0.0
@@ -205,10 +205,10 @@ def decays(series: np.ndarray, mean: float, variance: float) -> bool:
 
 
 def theory(run: Run, energy: float, measured: float | None) -> list[float | None]:
-    """Return theoretical values of the quantities of `means` and of the pressure of an ideal gas.
+    """Return theoretical values of the quantities of `means`, and the pressure of an ideal gas.
 
     The observable `temperature` of n disks is kT (1 - 1/n), because it excludes the mean motion. If
-    no theory predicts kT, the other values follow from the measured temperature.
+    no theory predicts kT, the other values are based on the measured temperature.
     """
     count, alike = run.n_disks, [kind.alike for kind in run.by_species]
     law: list[float | None] = [None] * (len(alike) + 3)
@@ -239,7 +239,7 @@ def theory(run: Run, energy: float, measured: float | None) -> list[float | None
 
 
 def equilibrium_temperature(run: Run, energy: float) -> float | None:
-    """Return kT of a run in equilibrium from its heat bath or from its conserved energy."""
+    """Return kT in equilibrium, given by the heat bath or by the conserved energy."""
     nature = run.nature
     if baths := bath_temperatures(run.parameters):
         return baths[0]
@@ -265,7 +265,7 @@ def fixed_energy_factor(count: int) -> float:
 
 
 def conserved_drift(run: Run) -> tuple[float, int]:
-    """Return the energy of the centre of mass along axes of conserved momentum; count the axes."""
+    """Return the centre-of-mass energy along axes of conserved momentum, and their number."""
     free = conserved_momentum(run)
     momentum = np.sum(run.mass[:, None] * run.velocity[0], axis=0)
     return float(np.sum(momentum[free] ** 2) / 2 / np.sum(run.mass)), int(np.sum(free))

@@ -1,14 +1,15 @@
-"""Worker process of the laboratory, which simulates and sends frames to a web page.
+"""Worker process of the laboratory, which runs a simulation and sends frames to a web page.
 
-A request on standard input is a line of JSON. An answer on standard output begins with a letter and
-its length in four bytes: b for a frame, t for a JSON object, whose "is" is "scene" (the constant
-part of the picture), "numbers", "events" (the next ones), "state", "problems", "file" or "scan".
-The worker waits while two frames are not confirmed by the request "got".
+A request on standard input is a line of JSON. An answer on standard output begins with a letter, b
+for a frame or t for a JSON object, and its length in four bytes. The item "is" of a JSON object is
+"scene" (the constant part of the picture), "numbers", "events" (the next ones), "state",
+"problems", "file" or "scan". The worker waits while the page has not confirmed two frames by the
+request "got".
 
-A frame begins with seven numbers of 8 bytes: time, collisions per disk, positions of the left,
-right, bottom and top side, and the sum of 1, 2, 4, 8 over those of these sides that are open.
-Numbers of 4 bytes follow: positions x, y of all disks, velocities, and angles of rotating disks, in
-the byte order of the computer. They are NaN for disks outside of the box.
+A frame begins with seven numbers of 8 bytes: the time, the collisions per disk, the positions of
+the left, right, bottom and top side, and the sum of 1, 2, 4 and 8 over those of these sides that
+are open. Numbers of 4 bytes follow: positions x, y of all disks, velocities, and angles of rotating
+disks, in the byte order of the computer. They are NaN for disks outside the box.
 
 Changes are applied only at times at which no event is partly processed, so that the Python script
 of the function `script` can repeat the run bit for bit.
@@ -54,27 +55,27 @@ from .numbers import (
 DISKS = 20000  # largest number of disks
 MEMORY = 2 << 30  # largest memory of a process [bytes]
 INTERVAL = 1 / 60  # interval of frames [s]
-SLICE = 0.012  # longest time of a call of the engine between requests [s]
-FRAMES_AHEAD = 2  # largest number of frames that the page has not yet drawn
+SLICE = 0.012  # longest call of the engine between requests [s]
+FRAMES_AHEAD = 2  # largest number of frames that the page has not drawn yet
 NUMBERS_INTERVAL = 0.1  # interval of messages with numbers [s]
-EVENTS_SENT = 6  # number of next events that are shown
-MOST_SAMPLES = 4000  # largest number of samples that are kept
-SCAN_SAMPLES = 160  # samples of a value in a scan
-SCAN_EVENTS = 1000  # smallest number of events in four intervals of samples
-SCAN_SECONDS = 4.0  # s that a value in a scan may take, unless the request contains `seconds`
+EVENTS_SENT = 6  # number of next events shown
+MOST_SAMPLES = 4000  # largest number of samples kept
+SCAN_SAMPLES = 160  # samples per value in a scan
+SCAN_EVENTS = 1000  # fewest events in four intervals between samples
+SCAN_SECONDS = 4.0  # time limit of a value in a scan, unless the request contains `seconds` [s]
 COUNTED = ("collisions", "dissipated_energy")  # observables that are counts since the start
-#: Names of the input variables that define the motion of a side.
+#: Input variables that define the motion of a side.
 MOTION = ("motion", "velocity", "start_time", "end_time", "amplitude", "period", "phase")
 MOTION += ("mass", "force")
-AT_ONCE = 1e-9  # relative time after which disks enter that the user lets in
+AT_ONCE = 1e-9  # relative delay after which disks let in by the user enter
 HOLD = 0.15  # time in which a dragged side reaches the pointer [s]
 ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
 UNREAD = bytearray()  # incomplete line at the end of the data received
-PR_SET_PDEATHSIG = 1  # option PR_SET_PDEATHSIG of prctl
+PR_SET_PDEATHSIG = 1  # option of prctl
 
 
 class Session:
-    """Simulation that a page shows, and the pace at which the simulation advances."""
+    """Simulation shown on a page, and the pace at which it advances."""
 
     def __init__(self, describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
         """Store the function that converts the constant part of a picture to values and arrays."""
@@ -87,18 +88,18 @@ class Session:
         self.actions: list[tuple] = []  # changes: time, kind, value as requested, exact value
         self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST_SAMPLES)
         self.last_event: tuple | None = None
-        self.encounters: list[dict] = []  # collisions of a few disks that the page does not have
-        self.goal: tuple[float, int, int] | None = None  # end time of a step that is in progress
+        self.encounters: list[dict] = []  # collisions of a few disks not yet sent to the page
+        self.goal: tuple[float, int, int] | None = None  # end of a step in progress
         self.made = 0  # number of changes of variables when the scene was last sent
-        self.held: dict[int, dict] = {}  # number of each dragged side, and its earlier motion
+        self.held: dict[int, dict] = {}  # earlier motion of each dragged side, by its index
         self.led = False  # whether the page sets the time of each frame
-        self.open_sides = 0  # sum of 1 << k over the sides k that are open
-        self.closing: dict[str, str] | None = None  # the side that a disk keeps from being closed
+        self.open_sides = 0  # sum of 1 << k over the open sides k
+        self.closing: dict[str, str] | None = None  # side that a disk prevents from closing
 
     # --- requests ---
 
     def start(self, request: dict) -> None:
-        """Replace the present simulation by a simulation of the new input if the input is valid."""
+        """Replace the present simulation by one of a new input, if the input is valid."""
         pace = max(0.0, float(request["pace"] or 0.0))
         try:
             other = Simulation._of(request["text"], setting_lines(request["settings"]))
@@ -154,7 +155,7 @@ class Session:
         self.set_disk("position", int(request["disk"]), [x, y])
 
     def push(self, request: dict) -> None:
-        """Double the kinetic energy of a disk; a disk at rest gets a typical velocity upwards."""
+        """Double the kinetic energy of a disk; a disk at rest moves upwards at a typical speed."""
         disk = int(request["disk"])
         own = np.sqrt(2) * self.simulation.velocity[disk]
         upwards = [0.0, typical_speed(self.simulation)]
@@ -166,7 +167,7 @@ class Session:
         self.set_disk("velocity", int(request["disk"]), [x, y], "aim")
 
     def set_disk(self, name: str, disk: int, value: list[float], what: str = "") -> None:
-        """Set the position or the velocity of one disk; `what` is the name of the action."""
+        """Set the position or the velocity of a disk; `what` is the name of the action."""
         if not 0 <= disk < self.run.n_disks:
             raise ValueError("no such disk")
         if np.isnan(self.simulation.position[disk, 0]):
@@ -178,8 +179,8 @@ class Session:
     def hold(self, request: dict) -> None:
         """Move a side to a position at constant velocity, or restore its earlier motion.
 
-        Its speed is at most the rms speed of the disks. It stays where its earlier motion is
-        impossible.
+        Its speed is at most the rms speed of the disks. If its earlier motion is impossible, it
+        stays where it is.
         """
         number, target = int(request["side"]), request["to"]
         name, inwards = f"side.{SIDES[number]}.", 1 if number % 2 == 0 else -1
@@ -199,7 +200,7 @@ class Session:
         self.apply("hold", rest | {name + word: value for word, value in wish.items()})
 
     def lid(self, request: dict) -> None:
-        """Open a side, or close it as soon as no disk overlaps its line."""
+        """Open a side, or close it as soon as no disk overlaps it."""
         side, is_open = SIDES[int(request["side"])], bool(request["open"])
         wish = {f"side.{side}.open": value_text("", is_open)}
         self.closing = None
@@ -229,8 +230,8 @@ class Session:
     ) -> bool:
         """Apply a change at a time that a repeated run can reach exactly; return True on success.
 
-        Without `change`, `value` contains new settings of variables. If `refused`, the page
-        receives the reason of a failure.
+        If `change` is None, `value` holds new settings of variables. If `refused`, the page
+        receives the reason for a failure.
         """
         try:
             now = self.simulation._settle()
@@ -269,22 +270,22 @@ class Session:
         self.pace = max(0.0, float(request["pace"]))
 
     def got(self, _: dict) -> None:
-        """Record that the page has drawn one more frame."""
+        """Record that the page has drawn another frame."""
         self.unconfirmed = max(0, self.unconfirmed - 1)
 
     def step(self, request: dict) -> None:
-        """Advance the simulation by the requested time, and then pause."""
+        """Advance the simulation by the requested time and pause."""
         if not (more := float(request["time"])) >= 0:
             raise ValueError("a step cannot go back in time")
         self.playing, self.led = False, False
         self.goal = self.simulation.time + more, NEVER, NEVER
 
     def reach(self, request: dict) -> None:
-        """Advance to the time at which the page compares several runs, and then await a request."""
+        """Advance to the time at which the page compares several runs, and wait for a request."""
         self.led, self.goal = True, (float(request["time"]), NEVER, NEVER)
 
     def event(self, request: dict) -> None:
-        """Advance the simulation by one event, and then pause."""
+        """Advance the simulation by one event and pause."""
         coming = [] if self.run.time_step else self.simulation.next_events(1)
         if not coming and not self.run.time_step:
             self.pause(request)  # no further event can occur
@@ -294,7 +295,7 @@ class Session:
         self.last_event = coming[0] if coming else None
 
     def keep(self, request: dict) -> None:
-        """Send a file that the user requests: the `input`, a `script` or the `output`."""
+        """Send a file requested by the user: the `input`, a `script` or the `output`."""
         name, part = self.request["input"], request["part"]
         try:
             end = self.simulation.time if self.ended else self.simulation._settle()
@@ -313,8 +314,8 @@ class Session:
         send_json({"is": "file", "name": name + ENDINGS[part], "body": letters})
 
     def output_file(self, name: str) -> bytes:
-        """Return the contents of an output file; TERM waits until its folder is removed."""
-        ends: list[int] = []  # not blocked: a thread of a library would receive it
+        """Return the contents of an output file, delaying TERM until its folder is removed."""
+        ends: list[int] = []  # not blocked, because a thread of a library would then receive it
         before = signal.signal(signal.SIGTERM, lambda number, _: ends.append(number))
         try:
             with tempfile.TemporaryDirectory(prefix="ricochet-lab-") as folder:
@@ -339,13 +340,13 @@ class Session:
         limits = self.goal or (self.simulation.time + self.pace * passed, NEVER, NEVER)
         try:
             if self.go_on(limits) and self.goal:
-                return  # a step is shown only when it is complete
+                return  # a step is shown only when complete
         except ProgramError as problem:
             self.ended, self.reason = True, str(problem)
         self.goal = None
         if self.closing and self.apply("lid", self.closing, refused=False):
             self.closing = None
-        if len(self.simulation.changes) != self.made:  # a change that the input plans
+        if len(self.simulation.changes) != self.made:  # a change scheduled in the input
             self.send_scene(changed=True)
         self.send_frame()
         if self.ended or stepping or now > self.numbers_sent + NUMBERS_INTERVAL:
@@ -354,7 +355,7 @@ class Session:
             self.send_state()
 
     def go_on(self, limits: tuple[float, int, int]) -> bool:
-        """Advance for at most `SLICE`; return True if no limit has been reached so far."""
+        """Advance for at most `SLICE`; return True as long as no limit has been reached."""
         if are_recorded(self.run):
             record = self.encounters.append
             return advance_and_record(self.simulation, limits, SLICE, record)
@@ -392,7 +393,7 @@ class Session:
             self.last_event, self.encounters = None, []
 
     def send_state(self, problem: str = "") -> None:
-        """Send the state of the simulation, its changes so far, and the reason of a refusal."""
+        """Send the state of the simulation, its changes so far, and the reason for a refusal."""
         changes = [
             (when, name, value)
             for when, what, values, _ in self.actions
@@ -402,7 +403,7 @@ class Session:
         times |= {value[1] for _, what, value, _ in self.actions if what == "pump"}
         planned = [one for one in self.simulation.changes if one[0] not in times]
         changes = sorted(changes + planned, key=lambda one: one[0])
-        # While the user drags a side, the description of this change is sent only once.
+        # While the user drags a side, this change is described only once.
         changes = [
             one
             for k, one in enumerate(changes)
@@ -412,7 +413,7 @@ class Session:
         send_json({"is": "state", "changes": changes} | state)
 
     def send_numbers(self) -> None:
-        """Send the present energies, and means over the time since the last change, with errors."""
+        """Send the present energies, and means since the last change with their errors."""
         self.numbers_sent = time.perf_counter()
         run, value = self.run, observed(self.simulation)
         now = value["time"]
@@ -447,7 +448,7 @@ class Session:
 
 
 def setting_lines(settings: dict[str, str]) -> list[str]:
-    """Return each setting as a text GROUP.VARIABLE=VALUE, the format of the option `--set`."""
+    """Return each setting in the form GROUP.VARIABLE=VALUE of the option `--set`."""
     lines = [f"{name}={value}" for name, value in settings.items()]
     if any("\n" in line or "\r" in line for line in lines):
         raise ValueError("a value must not contain line ends")
@@ -465,18 +466,18 @@ def problems(reason: Exception) -> list[dict]:
 
 
 def refuse(reason: Exception, change: bool = False) -> None:
-    """Send the page the reasons why a request was refused."""
+    """Tell the page why a request was refused."""
     send_json({"is": "problems", "change": change, "problems": problems(reason)})
 
 
 def send(kind: bytes, body: bytes) -> None:
-    """Write one answer to standard output."""
+    """Write an answer to standard output."""
     sys.stdout.buffer.write(kind + struct.pack(">I", len(body)) + body)
     sys.stdout.buffer.flush()
 
 
 def send_json(message: dict) -> None:
-    """Write one answer to standard output in JSON."""
+    """Write an answer to standard output as JSON."""
     try:
         text = json.dumps(message, allow_nan=False)
     except ValueError:  # NaN and infinity are sent as null
@@ -485,7 +486,7 @@ def send_json(message: dict) -> None:
 
 
 def requests(wait: float | None) -> list[dict]:
-    """Return all requests that have arrived, after waiting for one for at most `wait` seconds."""
+    """Return all requests that have arrived, waiting for the first for at most `wait` seconds."""
     if select.select([0], [], [], wait)[0]:
         data = os.read(0, 1 << 20)
         if not data:
@@ -495,11 +496,11 @@ def requests(wait: float | None) -> list[dict]:
     UNREAD[:] = rest
     found = list(map(json.loads, lines))
     starts = [request for request in found if request["do"] == "start"]
-    return [one for one in found if one not in starts[:-1]]  # only the last start is used
+    return [one for one in found if one not in starts[:-1]]  # only the last start counts
 
 
 def scan(request: dict) -> None:
-    """Simulate several values of an input variable, and send each result or error message."""
+    """Run a simulation for each of several values of a variable, and send each result or error."""
     for index, value in enumerate(request["values"]):
         try:
             lines = setting_lines(request["settings"] | {request["variable"]: value})
@@ -514,8 +515,9 @@ def scan(request: dict) -> None:
 def measure(text: str, lines: list[str], name: str, seconds: float) -> tuple[float, float | None]:
     """Return the time average of an observable and its error, after at most `seconds`.
 
-    For a count (`COUNTED`) it is the rate of growth. Samples are half a collision per disk apart,
-    and their second half is averaged; there is an error only if the run relaxes to equilibrium.
+    For a count (`COUNTED`) this is the rate of growth. Samples are half a collision per disk apart,
+    and the second half of them is averaged. There is an error only if the run relaxes to
+    equilibrium.
     """
     samples, began = [], time.perf_counter()
     with Simulation._of(text, lines) as simulation:
@@ -529,7 +531,7 @@ def measure(text: str, lines: list[str], name: str, seconds: float) -> tuple[flo
     apart = np.diff(late[0])
     if not apart.any():
         raise ValueError("cannot measure: no collisions, or all collisions at the same time")
-    if name == "virial_pressure":  # this observable is a mean since the start
+    if name == "virial_pressure":  # a mean since the start
         one = pressure_between(late)
     else:
         gain = np.diff(late[-1]) if name in COUNTED else late[-1][1:] * apart
