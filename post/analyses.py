@@ -1,4 +1,4 @@
-"""List of all analyses, each with one line.
+"""List all analyses, each with a one-line description.
 
     python post/analyses.py
 

@@ -46,7 +46,7 @@ from tqdm import tqdm
 
 
 def film_path(wish: Path | None, run: Run) -> Path:
-    """Return the path of the film, which by default has the name of the run."""
+    """Return the path of the film, named after the run by default."""
     if not animation.FFMpegWriter.isAvailable():  # by the system
         with suppress(ImportError, RuntimeError):
             from imageio_ffmpeg import get_ffmpeg_exe
@@ -69,8 +69,8 @@ def animate(
 ) -> animation.FuncAnimation:
     """Write a film that shows the given frames, `fps` of them per second.
 
-    The argument `colour` is "species" or the name of another quantity in `COLOURINGS`, which the
-    colours of the disks show.
+    `colour` is the quantity that the colours of the disks represent: "species", or one of
+    `COLOURINGS`.
     """
     colour = chosen_colour(run, colour)
     aspect = aspect_of(run)

@@ -1,4 +1,4 @@
-"""Contact network and force chains of a run, from the collisions in a window of time.
+"""Contact network and force chains of a run, from the collisions in a time window.
 
     python post/contacts.py runs/hopper.h5 --from 3.5 --until 4 -o contacts.png --csv contacts.csv
 

@@ -1,4 +1,4 @@
-"""Mean kinetic energy of each species of an elastic or inelastic mixture against time.
+"""Mean kinetic energy of each species of an elastic or inelastic mixture as a function of time.
 
     python post/cooling.py runs/cooling/*.h5 -o cooling.png --csv cooling.csv
 

@@ -1,4 +1,4 @@
-"""Fraction of error bars that contain the true value (coverage of the error bars).
+"""Coverage of the error bars: fraction of error bars that contain the true value.
 
     python post/coverage.py runs/coverage/*/*.h5 -o coverage.png --csv coverage.csv
 

@@ -1,4 +1,4 @@
-"""Crater of a projectile: pictures before and after the impact, energy, and crater size.
+"""Impact of a projectile: pictures before and after the impact, energy, and crater size.
 
     python post/crater.py runs/crater.h5 -o crater.png
     python post/crater.py runs/scan/*.h5 --csv craters.csv     sizes of many runs, no figure

@@ -1,4 +1,4 @@
-"""Energies against time, and conservation of the total energy.
+"""Energies as functions of time, and conservation of the total energy.
 
     python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
 

@@ -1,4 +1,4 @@
-"""Equation of state Z = P / (n kT) of hard disks against packing fraction, from three methods.
+"""Equation of state Z = P / (n kT) of hard disks against packing fraction, by three methods.
 
     python post/equation_of_state.py runs/state/eta_*.h5 -o state.png --csv state.csv
 

@@ -1,4 +1,4 @@
-"""Time after which the kinetic energies of two species under gravity are equal.
+"""Time until two species under gravity have the same kinetic energy.
 
     python post/equipartition.py runs/fall/*.h5 -o equipartition.png --csv equipartition.csv
 

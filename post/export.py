@@ -1,4 +1,4 @@
-"""Convert a run to a file that other programs can read.
+"""Convert a run to a file for other programs.
 
     python post/export.py runs/gas.h5 -o gas.xyz     extended XYZ, opens in OVITO as a 2D system
     python post/export.py runs/gas.h5 -o gas.csv     one line per disk and frame, for other programs
@@ -29,10 +29,9 @@ PROPERTIES = "species:S:1:pos:R:2:velo:R:2:radius:R:1:mass:R:1"
 
 
 def rows(run: Run, frame: int) -> list[list[str]]:
-    """Return the quantities of each disk in the box in a frame as text.
+    """Return the quantities of each disk in the box as text.
 
-    The quantities are species, x, y, vx, vy, radius and mass, followed by any further quantities
-    that the run contains, and the id of the disk.
+    They are species, x, y, vx, vy, radius and mass, any further quantities in the run, and the id.
     """
     inside = run.in_box(frame)
     species = [run.names[run.species[k] - 1] for k in inside]
@@ -45,8 +44,8 @@ def rows(run: Run, frame: int) -> list[list[str]]:
 def xyz_frame(run: Run, frame: int) -> str:
     """Return a frame in extended XYZ format.
 
-    The origin of the positions is the lower left corner of the box. The second vector of the
-    lattice leads to the image above the box, which is displaced along x in a sheared box.
+    Positions are relative to the lower left corner of the box. The second lattice vector points to
+    the image above the box, which is displaced along x in a sheared box.
     """
     (width, height), (x0, y0) = run.edges, run.lower
     tilt = math.remainder(run.shear_rate * height * run.time[frame], width)
@@ -72,7 +71,7 @@ TEXTS = {".xyz": xyz_frame, ".csv": csv_frame}
 
 
 def write_text(run: Run, path: Path, frames: list[int]) -> None:
-    """Write frames to a text file, whose file name extension selects the format."""
+    """Write frames to a text file in the format given by the file extension."""
     with destination(path).open("w") as file:
         if path.suffix == ".csv":
             file.write(",".join([HEAD, *run.disk_data]) + "\n")

@@ -1,4 +1,4 @@
-"""Table of the settings, states and results of all runs of a sweep (its member runs).
+"""Table of the settings, states and results of all member runs of a sweep.
 
     python post/gather.py runs/scan --csv scan.csv
 
@@ -28,7 +28,7 @@ from ricochet.script import launch
 
 
 def with_flows(folder: Path, rows: list[dict]) -> list[FlowShare]:
-    """Add the share of flows to the rows of finished gases that cool, and return all shares."""
+    """Add `flow_share` to the rows of finished cooling gases, and return all these shares."""
     found = []
     for row in rows:
         if row["state"] == "finished" and row.get("dissipated_energy", 0) > 0:

@@ -1,4 +1,4 @@
-"""Laboratory: an interactive page that shows running simulations and changes their parameters.
+"""Laboratory: an interactive page that runs simulations and changes their parameters.
 
     python post/lab.py                 with the inputs of the folder input/
     python post/lab.py my.nml          also with your own input file
@@ -41,7 +41,7 @@ work(scene)"""
 
 
 def routes(lab: Lab) -> dict:
-    """Return for each address of the web server the function that answers the requests."""
+    """Return the function that answers requests for each address of the web server."""
     data = {"table": lab.table, "inputs": chooser([*lab.inputs.values()])}
 
     async def formed(request: web.Request) -> web.Response:
@@ -80,7 +80,7 @@ def open_page(address: str) -> None:
 
 
 def in_use(address: str) -> str:
-    """Return the message that another program has the usual port of the laboratory."""
+    """Return the message that another program occupies the usual port of the laboratory."""
     usual = f"http://127.0.0.1:{USUAL_PORT}/"
     return f"Port {USUAL_PORT} is in use: in links of the lesson, replace {usual} by {address}"
 

@@ -1,4 +1,4 @@
-"""Divergence of initially close trajectories, and the Lyapunov exponent.
+"""Divergence of trajectories that start close together, and the Lyapunov exponent.
 
     python post/lyapunov.py runs/pairs/*.h5 -o lyapunov.png --csv lyapunov.csv
 

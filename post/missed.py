@@ -1,4 +1,4 @@
-"""Fraction of collisions that time-stepped simulations fail to detect.
+"""Fraction of collisions missed by time-stepped simulations.
 
     python post/missed.py runs/rates_events/*.h5 runs/rates_steps/*.h5 -o missed.png
 

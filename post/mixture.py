@@ -1,4 +1,4 @@
-"""Speeds and energies of each species of a mixture, at the start and in equilibrium.
+"""Speeds and energies of each species of a mixture, initially and in equilibrium.
 
     python post/mixture.py runs/mixture/*.h5 -o mixture.png --csv mixture.csv
 

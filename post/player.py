@@ -35,7 +35,7 @@ LIVE_ROOM = 6e6  # size of the film of an unfinished run, which is sent repeated
 
 
 def chosen_film(run: Run, args: Namespace, room: float) -> tuple[list[int], tuple[dict, dict]]:
-    """Return the film and the frame numbers that the command-line options request."""
+    """Return the frames and the film that the command-line options request."""
     frames = chosen_frames(run, args.frames, args.count or frames_that_fit(run, room))
     traced = chosen_disks(run, args.disks or [])
     return frames, film(run, frames, chosen_colour(run, args.colour), traced, room)

@@ -1,4 +1,4 @@
-"""Cooling of rough disks: translational and rotational temperature against theory.
+"""Cooling of rough disks: translational and rotational temperature, compared with theory.
 
     python post/rough.py runs/rough.h5 -o rough.png --csv rough.csv
 

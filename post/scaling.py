@@ -1,4 +1,4 @@
-"""Speedup of a run that uses several processor cores.
+"""Speedup of runs on several processor cores.
 
     build/ricochet gas.nml -o runs/t2_1.h5 --set run.threads=2
     python post/scaling.py runs/t*.h5 -o scaling.png --csv scaling.csv

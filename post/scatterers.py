@@ -1,4 +1,4 @@
-"""Write a file with randomly placed circles, the obstacles of a random Lorentz gas.
+"""Write a file of randomly placed circles, the obstacles of a random Lorentz gas.
 
     python post/scatterers.py 100000 0.01 --radius 0.9 --seed 1 -o scatterers.txt
 

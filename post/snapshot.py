@@ -35,7 +35,7 @@ from matplotlib.colors import LogNorm, Normalize, to_rgba_array
 
 
 def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
-    """Return a colour scale for the given values; the few largest values exceed the scale."""
+    """Return a colour scale for the given values, exceeded by the few largest of them."""
     if colour in ("psi6", "spin"):
         top = np.nanquantile(np.abs(values), 0.995) or 1.0
         return Normalize(*drawing.limits_of(colour, top))
@@ -47,9 +47,9 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
 
 
 def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
-    """Draw a reference arrow above a panel, with the speed that corresponds to its length.
+    """Draw a reference arrow above a panel, labelled with the speed that it represents.
 
-    The arrow is above the title of the panel if both do not fit side by side.
+    The arrow is placed above the title of the panel if both do not fit side by side.
     """
     power = 10.0 ** np.floor(np.log10(longest))
     speed = max(step * power for step in (1, 2, 5) if step * power <= longest)

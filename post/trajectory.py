@@ -29,9 +29,9 @@ from matplotlib.patches import Circle
 def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
     """Return the path (T', 2) of each disk through the given frames.
 
-    If a path crosses a periodic side, the path is extended beyond this side, and continues from the
-    opposite side of the box.  At a periodic side, a row of NaN separates the two pieces of a path.
-    A row of NaN also separates the pieces of a path before and after a disk has been recycled.
+    A path that crosses a periodic side is extended beyond this side and continues from the opposite
+    side of the box. A row of NaN separates the two pieces, and likewise the pieces of a path before
+    and after a disk is recycled.
     """
     paths = np.moveaxis(run.position[frames][:, disks], 1, 0)
     counts, images = np.zeros(paths.shape[:2]), np.zeros(paths.shape, dtype=int)
@@ -45,7 +45,7 @@ def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
 
 
 def drawn(path: np.ndarray, image: np.ndarray, count: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return a path (T, 2), with a row of NaN wherever the number `count` (T,) changes."""
+    """Return a path (T, 2) with a row of NaN wherever the number `count` (T,) changes."""
     cuts = np.flatnonzero(np.diff(count)) + 1
     pieces = []
     for own, crossed in zip(np.split(path, cuts), np.split(image, cuts), strict=True):
@@ -54,7 +54,7 @@ def drawn(path: np.ndarray, image: np.ndarray, count: np.ndarray, edges: np.ndar
 
 
 def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return a path (T, 2) that is extended beyond periodic sides at both ends of each crossing."""
+    """Return a path (T, 2), extended past the periodic side at both ends of each crossing."""
     rows = [path[:1]]
     gap = np.full((1, 2), np.nan)
     for start, end, jump in zip(path[:-1], path[1:], np.diff(image, axis=0), strict=True):
@@ -73,7 +73,7 @@ def has_every_event(run: Run, frames: list[int]) -> bool:
 
 
 def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) -> None:
-    """Draw the paths of the chosen disks, and all disks at their last positions."""
+    """Draw the paths of the chosen disks, and all disks in the last frame."""
     draw_box(axes, run, run.time[frames[-1]])
     others = np.full(run.n_disks, "0.85")
     others[disks] = "none"

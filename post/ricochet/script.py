@@ -1,6 +1,6 @@
-"""Command-line options, reports and exit codes that are common to the scripts in post/.
+"""Command lines, printed reports and exit codes of the scripts in post/.
 
-Figures are drawn without a display; their style is defined in `style.mplstyle`.
+Figures are drawn without a display, in the style of `style.mplstyle`.
 """
 
 import argparse
@@ -38,13 +38,13 @@ from .reports.tables import (
 )
 from .running.ensembles import in_order, read_manifest
 
-PATIENCE = 5.0  # time after which a terminal shows that an analysis is running [s]
+PATIENCE = 5.0  # computing time after which a terminal shows that an analysis is running [s]
 
 # --- options ---
 
 
 class Parser(argparse.ArgumentParser):
-    """Command-line parser that suggests a similar option if an option is unknown."""
+    """Command-line parser that suggests a similar option for an unknown one."""
 
     def parse_args(self, args: Sequence[str] | None = None, namespace=None) -> argparse.Namespace:
         words = joined(sys.argv[1:] if args is None else args)
@@ -72,7 +72,8 @@ class Parser(argparse.ArgumentParser):
 def finished(paths: list[Path]) -> list[Path]:
     """Return the paths of finished runs, or all if none has finished; warn about unfinished ones.
 
-    If all files of a sweep are given, its members without an output file are unfinished, too.
+    If all files of a sweep are given, members of the sweep without an output file count as
+    unfinished, too.
     """
     whole = [path for path in paths if path.suffix != ".part"]
     if not whole:
@@ -90,7 +91,7 @@ def finished(paths: list[Path]) -> list[Path]:
 
 
 def joined(words: Iterable[str]) -> list[str]:
-    """Join a list such as '-10:' to its option; argparse would take it for another option."""
+    """Attach a list such as '-10:' to its option, because argparse would take it for an option."""
     result: list[str] = []
     for word in words:
         if re.fullmatch(r"-\d+[,:][-\d,:]*", word) and result and result[-1].startswith("--"):
@@ -111,10 +112,10 @@ def command_line(
 ) -> Parser:
     """Return a command-line parser, whose help text is the docstring `doc` of the script.
 
-    `one` allows a single run, `repeated` duplicate runs, and `open_systems` runs that disks leave
-    or enter; the parser default `paired` also uses unfinished runs. `csv` adds the option --csv.
-    Each further keyword names one of the `OPTIONS` with its default, which may be None, or a text
-    on what the script does without the option.
+    `one` restricts the script to a single run, `repeated` allows duplicate runs, and `open_systems`
+    runs that disks leave or enter; with the parser default `paired` unfinished runs are used, too.
+    `csv` adds the option --csv. Each further keyword names one of the `OPTIONS` and gives its
+    default, which may be None, or a text saying what the script does without the option.
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
@@ -150,8 +151,8 @@ def report(
 ) -> None:
     """Print the tables, save the figure, and write the file of --csv.
 
-    That file contains `data` or the first table. The warnings `notes`, and those about runs that
-    ended early, are written to stderr and on the figure.
+    This file contains `data` or else the first table. The warnings `notes`, and warnings about runs
+    that ended early, appear on stderr and on the figure.
     """
     notes = [
         *(run.termination_note for run in args.runs if run.termination_note),
@@ -203,7 +204,7 @@ def run_analysis(name: str, doc: str) -> None:
 
 @contextmanager
 def timer(name: str) -> Iterator[None]:
-    """Show on a terminal how long an analysis has taken, once it takes more than 5 s."""
+    """Show on a terminal how long an analysis has been running, once it exceeds `PATIENCE`."""
     ended = threading.Event()
 
     def show() -> None:
@@ -229,7 +230,7 @@ def timer(name: str) -> Iterator[None]:
 
 
 def launch(main: Callable[[], None]) -> None:
-    """Run the main function of a script, and report exceptions in one line on stderr.
+    """Run the main function of a script, reporting exceptions in one line on stderr.
 
     The exit code is 1 for `Refused` and 2 for other exceptions. `python -X dev` shows the traceback
     of an unexpected exception.
@@ -243,7 +244,7 @@ def launch(main: Callable[[], None]) -> None:
         main()
     except RunError as problem:
         give_up(name, str(problem), code=1 if isinstance(problem, Refused) else 2)
-    except OSError as problem:  # errors while writing, as on a full disk, have no file name
+    except OSError as problem:  # write errors, such as a full disk, have no file name
         give_up(name, f"{problem.filename or 'cannot write the output'}: {problem.strerror}")
     except Exception as problem:
         if sys.flags.dev_mode:
@@ -255,6 +256,6 @@ def launch(main: Callable[[], None]) -> None:
 
 
 def give_up(name: str, reason: str, code: int = 2) -> NoReturn:
-    """Print an error message in one line, and exit with the given code."""
+    """Print an error message on one line, and exit with the given code."""
     print(f"{name}: {' '.join(reason.split())}", file=sys.stderr)
     sys.exit(code)

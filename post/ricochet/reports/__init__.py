@@ -1,4 +1,4 @@
-"""Analyses of runs: each computes a table and draws a figure (`ricochet.analyses` lists them)."""
+"""Analyses of runs, each of which computes a table and draws a figure (see `ricochet.analyses`)."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
@@ -16,7 +16,7 @@ HERE = Path(__file__).parent
 
 
 class Analyses(Mapping[str, str]):
-    """Names of all analyses with a line each, which is read without executing their modules."""
+    """Names of all analyses, each with a line of description, read without loading the modules."""
 
     def __init__(self) -> None:
         """Find the modules of all analyses."""
@@ -43,7 +43,7 @@ analyses = Analyses()
 
 
 def analysis(name: str) -> "Analysis":
-    """Return the analysis with a name."""
+    """Return the analysis of the given name."""
     if name not in analyses:
         hint = did_you_mean(name, analyses) or f"; there are {', '.join(analyses)}"
         raise ValueError(f"no analysis {name}{hint}")
@@ -63,7 +63,7 @@ def analyse(
     runs : Run, str, pathlib.Path or list
         one or several runs, or paths of output files
     **options
-        options of the script with the name of the analysis, with underscores for hyphens
+        options of the script of the same name, with underscores in place of hyphens
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Groups of runs that an analysis combines."""
+"""Groups of runs combined by an analysis."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from ..reading.reader import Restitution, Run
 
 @dataclass
 class Group:
-    """Runs that an analysis combines."""
+    """Runs combined by an analysis."""
 
     key: Any  # value that the runs have in common, such as a number of disks
-    runs: list[Run]  # the runs
+    runs: list[Run]
     values: Any = None  # results of the analysis
     colour: str = ""  # colour of the group in figures
 
@@ -25,45 +25,45 @@ Grouping = Callable[[list[Run]], Iterable[tuple[Any, list[Run]]]]
 
 
 def grouped(runs: Iterable[Run], key: Callable[[Run], Any]) -> list[tuple[Any, list[Run]]]:
-    """Group the runs by the value of the function `key`, and sort the groups by this value."""
+    """Group the runs by the value of `key`, and sort the groups by this value."""
     ordered = sorted(runs, key=key)
     return [(value, list(group)) for value, group in groupby(ordered, key=key)]
 
 
 def together(runs: list[Run]) -> list[tuple[None, list[Run]]]:
-    """All runs are in one group."""
+    """Put all runs into one group."""
     return [(None, runs)]
 
 
 def each_run(runs: list[Run]) -> list[tuple[str, list[Run]]]:
-    """Each run is analysed alone."""
+    """Put each run into a group of its own."""
     return [(run.path.name, [run]) for run in runs]
 
 
 def by_number(runs: Iterable[Run]) -> list[tuple[int, list[Run]]]:
-    """Runs with the same number of disks are combined."""
+    """Group runs with the same number of disks."""
     return grouped(runs, lambda run: run.n_disks)
 
 
 def by_restitution(runs: Iterable[Run]) -> list[tuple[Restitution, list[Run]]]:
-    """Runs with the same coefficient of restitution and law of restitution are combined."""
+    """Group runs with the same law and coefficient of restitution."""
     return grouped(runs, lambda run: run.contact_law)
 
 
 def by_packing(runs: Iterable[Run]) -> list[tuple[float, list[Run]]]:
-    """Runs with the same packing fraction are combined."""
+    """Group runs with the same packing fraction."""
     return grouped(runs, lambda run: round(packing(run), 6))
 
 
-#: Parts of the parameters that do not change the physics of a run, apart from its random numbers.
+#: Parts of the parameters that do not affect the physics of a run, apart from its random numbers.
 NO_PHYSICS = {"input", "overrides", "seed", "output", "stop"}
-LONGEST = 40  # largest number of letters of a value in a warning
+LONGEST = 40  # longest value in a warning [letters]
 
 
 def differences(groups: Iterable[Sequence[Run]], expected: Collection[str] = ()) -> list[str]:
-    """Return a warning if runs of a group differ in the values of their physical parameters.
+    """Return a warning if runs within a group differ in the values of physical parameters.
 
-    `expected` contains groups and variables of the input that may differ.
+    `expected` lists groups and variables of the input that may differ.
     """
     found: dict[str, dict[str, None]] = {}
     for runs in groups:
@@ -77,7 +77,7 @@ def differences(groups: Iterable[Sequence[Run]], expected: Collection[str] = ())
 
 
 def listed_values(values: list[str]) -> str:
-    """Return a list of different values; of more than four only the number."""
+    """Return a list of different values, or only their number if there are more than four."""
     if any(len(value) > LONGEST for value in values):
         return ""
     return f": {', '.join(values)}" if len(values) < 5 else f": {len(values)} values"
@@ -102,9 +102,9 @@ def physics(run: Run, expected: Collection[str] = ()) -> dict[str, str]:
 
 
 def of_species(own: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parameters of a species without the radius or the packing fraction.
+    """Return the parameters of a species without its radius or without its packing fraction.
 
-    One of them determines the other, except for random radii, whose packing fraction is random.
+    One of the two determines the other, except for random radii, whose packing fraction is random.
     """
     if "packing_fraction" not in own:
         return dict(own)
@@ -113,7 +113,7 @@ def of_species(own: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def leaves(parameters: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Yield the full name and the value as text of each variable in nested groups."""
+    """Yield the full name of each variable in nested groups, and its value as text."""
     for name, value in parameters.items():
         if isinstance(value, Mapping):
             yield from leaves(value, f"{prefix}{name}.")

@@ -16,7 +16,7 @@ from ..reading.units import Units, units_of
 
 
 def frame_list(text: str) -> tuple[int | slice, ...]:
-    """Convert a list of frame numbers and ranges, such as '0,10,-1' or '100:200', to indices."""
+    """Convert a list of frames and ranges, such as '0,10,-1' or '100:200', to indices."""
 
     def chosen(part: str) -> int | slice:
         if ":" not in part:
@@ -49,7 +49,7 @@ def positive(text: str) -> int:
 
 
 def not_negative(text: str) -> float:
-    """Convert a text to a number that is not negative."""
+    """Convert a text to a nonnegative number."""
     value = float(text)
     if not 0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"'{text}' is not a number of at least 0")
@@ -68,14 +68,14 @@ def unit_names(text: str) -> Units:
 class Option:
     """Option of an analysis."""
 
-    # Name of the argument in Python; the option of the script has hyphens instead of underscores.
+    # Name of the argument in Python; the option of the script has hyphens in place of underscores.
     name: str
     meaning: str  # help text
-    default: Any = None  # value without the option
-    # Conversion of the text on a command line; `bool` for an option without a value.
+    default: Any = None  # value if the option is missing
+    # Conversion of the text on the command line; `bool` for an option without a value.
     convert: Callable[[str], Any] = str
     symbol: str | None = None  # name of the value in the help text
-    choices: Sequence[str] | None = None  # allowed values [all values]
+    choices: Sequence[str] | None = None  # allowed values [all]
     number: int | None = None  # number of values, if there are several
     flag: str = ""  # name of the option of the script, if it differs from `name`
 
@@ -93,7 +93,7 @@ class Option:
         parser.add_argument(*names, **more)
 
     def value(self, given: Any) -> Any:
-        """Return the value of an argument in Python, which may be a text as on a command line."""
+        """Return the value of a Python argument, which may be a text as on a command line."""
         if self.choices and given not in self.choices:
             raise ValueError(f"{self.name} is not one of {', '.join(self.choices)}: {given!r}")
         if not isinstance(given, str) or self.convert is str:
@@ -105,9 +105,9 @@ class Option:
 
 
 def shared(name: str, default: Any = None) -> Option:
-    """Return one of the `OPTIONS` of several analyses, with its default.
+    """Return one of the `OPTIONS` of several analyses with its default.
 
-    A text as default describes what the analysis does without the option; the value is then None.
+    A text as default describes what the analysis does without the option, whose value is then None.
     """
     convert, symbol, meaning = OPTIONS[name]
     if isinstance(default, str):
@@ -117,7 +117,7 @@ def shared(name: str, default: Any = None) -> Option:
     return Option(name, meaning, default, convert, symbol)
 
 
-#: Options of several scripts, each with name, conversion, symbol of the value, and help text.
+#: Options of several scripts: conversion, symbol of the value, and help text, by name.
 OPTIONS: dict[str, tuple[Callable[[str], Any], str, str]] = {
     "frames": (frame_list, "LIST", "frames to use, such as 0,10,-1 or 100:200 or ::5"),
     "count": (positive, "N", "largest number of frames, which are evenly spread"),
@@ -133,14 +133,14 @@ OPTIONS: dict[str, tuple[Callable[[str], Any], str, str]] = {
 }
 
 
-#: Option names of earlier versions, each with the present name of the option.
+#: Option names of earlier versions, with the present ones.
 RENAMED = {"--skip": "--equilibration", "--apart": "--min-separation", "--wave": "--wavenumber"}
 #: Alternative spellings of option names.
 SPELLINGS = {"colour": ["--color"]}
 
 
 def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | None) -> list[int]:
-    """Return the frame numbers that --frames [all] and --count (evenly spread) select."""
+    """Return the indices of the frames selected by --frames [all] and --count (evenly spread)."""
     frames: list[int] = []
     for part in which if which is not None else [slice(None)]:
         if isinstance(part, int) and not -run.n_frames <= part < run.n_frames:
@@ -154,10 +154,10 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
 
 
 def late_frames(run: Run, options: SimpleNamespace, warnings: list[str]) -> list[int]:
-    """Return the selected frames (--frames) that are in the steady state and far enough apart.
+    """Return the frames of --frames that are in the steady state and far enough apart.
 
-    If there are none, it is the last frame. Warnings are added if requested frames are not used, or
-    if the first speeds may still depend on the initial ones.
+    If there are none, the last frame is returned. Warnings are added if requested frames are not
+    used, or if the speeds in the first of them may still depend on the initial ones.
     """
     frames, start = (
         chosen_frames(run, options.frames, None),
@@ -181,7 +181,7 @@ def late_frames(run: Run, options: SimpleNamespace, warnings: list[str]) -> list
 
 
 def chosen_disks(run: Run, ids: list[int]) -> list[int]:
-    """Convert disk numbers, which begin with 1, to indices, which begin with 0."""
+    """Convert disk numbers, counted from 1, to indices."""
     for number in ids:
         if not 1 <= number <= run.n_disks:
             raise RunError(f"{run.path}: no disk {number}, there are {run.n_disks}")

@@ -26,20 +26,20 @@ def accept(run: Run) -> None:
 
 @dataclass(frozen=True)
 class Analysis:
-    """Analysis of runs, which a module of this package defines as `ANALYSIS`."""
+    """Analysis of runs, defined as `ANALYSIS` in a module of this package."""
 
-    # Function that returns the result for groups of runs and the values of all options.
+    # Returns the result for groups of runs, given the values of all options.
     compute: Callable[[list[Group], SimpleNamespace], Result]
-    draw: Callable[[Result], Sheet | None]  # function that returns the figure of a result
-    options: Sequence[Option] = ()  # options of the analysis
-    # Function that raises an error for a run to which the analysis does not apply.
+    draw: Callable[[Result], Sheet | None]  # draws the figure of a result
+    options: Sequence[Option] = ()
+    # Raises an error for a run to which the analysis does not apply.
     accepts: Callable[[Run], None] = accept
-    group_by: Grouping = together  # function that determines which runs are combined
-    averages: Grouping | None = None  # function that determines which runs are averaged [group_by]
+    group_by: Grouping = together  # determines which runs are combined
+    averages: Grouping | None = None  # determines which runs are averaged [group_by]
     may_differ: Sequence[str] = ()  # groups and variables in which averaged runs may differ
-    single: bool = False  # whether only one run is analysed
-    repeated: bool = False  # whether runs with the same final state are analysed separately
-    unfinished: bool = False  # whether unfinished runs are analysed together with finished runs
+    single: bool = False  # only one run is analysed
+    repeated: bool = False  # runs with the same final state are analysed separately
+    unfinished: bool = False  # unfinished runs are analysed, too
 
     @property
     def name(self) -> str:
@@ -48,13 +48,13 @@ class Analysis:
 
     @property
     def about(self) -> str:
-        """Line that describes the analysis."""
+        """One-line description of the analysis."""
         return analyses[self.name]
 
     def __call__(
         self, runs: Run | str | Path | Sequence[Run | str | Path], given: Mapping[str, Any]
     ) -> Result:
-        """Analyse runs or output files, with some of the options."""
+        """Analyse runs or output files with some of the options."""
         files = [runs] if isinstance(runs, Run | str | Path) else [*runs]
         found = [one if isinstance(one, Run) else read_run(one) for one in files]
         if not found or (self.single and len(found) > 1):
@@ -77,7 +77,7 @@ class Analysis:
     def result(
         self, runs: list[Run], options: SimpleNamespace, warnings: Iterable[str] = ()
     ) -> Result:
-        """Return the result for different runs and the values of all options."""
+        """Return the result for distinct runs and the values of all options."""
         for run in runs:
             stays_in_box(run)
             self.accepts(run)
@@ -96,7 +96,7 @@ class Analysis:
 
 
 def distinct(runs: list[Run]) -> tuple[list[Run], list[str]]:
-    """Return the runs with different final states, and a warning if others are left out."""
+    """Return the runs with distinct final states, and a warning if others are left out."""
     if len(runs) < 2:
         return runs, []
     found: dict[bytes, list[Run]] = {}

@@ -51,7 +51,7 @@ class Result:
     printed: Table | None = None
     data: Table | None = None
     values: Any = None
-    name: str = ""  # of the analysis
+    name: str = ""  # name of the analysis
     options: Any = None
     draw: Callable[["Result"], "Sheet | None"] | None = None
 
@@ -62,23 +62,23 @@ class Result:
 
     @property
     def shown(self) -> Table:
-        """Table that the script prints."""
+        """Table printed by the script."""
         return self.table if self.printed is None else self.printed
 
     def figure(self, panel: str | None = None, width: float | str | None = None) -> "Figure | None":
-        """Draw the figure, without text below 8 points.
+        """Draw the figure, with no text below 8 points.
 
         Parameters
         ----------
         panel
-            name of the panel to draw alone [all panels]
+            name of the only panel to draw [all panels]
         width
             width, such as 8.5 or '8.5cm', or 'slide' [16 cm]
 
         Returns
         -------
         figure : matplotlib.figure.Figure or None
-            figure, or None if the runs have none
+            the figure, or None if the runs have none
 
         Examples
         --------
@@ -121,7 +121,7 @@ class Result:
         return "\n".join(lines + [f"warning: {text}" for text in self.warnings])
 
     def _repr_html_(self) -> str:
-        """Return the figure and the table, which a notebook shows."""
+        """Return the figure and the table for a notebook."""
         head = "".join(f"<th>{html.escape(name)}</th>" for name in columns(self.table))
         rows = [[cell(value) for value in row.values()] for row in self.table]
         body = "".join(f"<tr>{''.join(f'<td>{one}</td>' for one in row)}</tr>" for row in rows)
@@ -140,6 +140,6 @@ class Result:
 
 
 def cell(value: object) -> str:
-    """Return a cell of a table as text."""
+    """Return a table cell as text."""
     text = f"{value:.6g}" if isinstance(value, float) else str(value)
     return "-" if value is None else html.escape(text)

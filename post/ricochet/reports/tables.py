@@ -1,4 +1,4 @@
-"""Rows and columns of tables, and their text."""
+"""Rows and columns of tables, and tables as text."""
 
 import csv
 import re
@@ -20,9 +20,9 @@ Table = dict[str, Any] | list[dict[str, Any]]
 def measured(
     name: str, estimate: Estimate | SeriesMean | None, at: int | tuple[int, ...] = ()
 ) -> dict[str, float | None]:
-    """Return two cells of a table row: mean and error of an estimate, or of point `at` of a curve.
+    """Return mean and error of an estimate, or of the point `at` of a curve, as two table cells.
 
-    Both are None for no estimate.
+    Both are None if there is no estimate.
     """
     parts = (None, None) if estimate is None else (estimate.mean, estimate.error)
     values = [part if part is None else float(np.asarray(part)[at]) for part in parts]
@@ -32,15 +32,15 @@ def measured(
 def over_runs(
     name: str, members: Sequence[SeriesMean], notes: list[str], about: str
 ) -> dict[str, float | None]:
-    """Return the table cells of a mean over runs, and add warnings about the mean to `notes`."""
+    """Return the table cells of a mean over runs, and add warnings about it to `notes`."""
     notes += diagnostics(about, members)
     return measured(name, combine_runs(members))
 
 
 def spread(results: dict[str, dict[str, Any]]) -> dict[str, np.ndarray]:
-    """Convert groups of results to columns, whose names end with the keys of the groups.
+    """Convert groups of results to columns whose names end with the keys of the groups.
 
-    There is one column for a number, and two for an estimate.
+    A number yields one column, an estimate two.
     """
     columns: dict[str, Any] = {}
     for end, found in results.items():
@@ -90,13 +90,13 @@ def columns(table: Table) -> dict[str, Iterable[Any]]:
 
 
 def with_all_columns(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the rows with all columns; missing cells are None."""
+    """Return the rows with all columns, filling missing cells with None."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     return [{name: row.get(name) for name in names} for row in rows]
 
 
 def write_csv(path: Path, table: Table) -> None:
-    """Write a table as a CSV file with a header line and full numerical precision."""
+    """Write a table as a CSV file with a header line, with full precision."""
     table = columns(table)
     with destination(path).open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -105,7 +105,7 @@ def write_csv(path: Path, table: Table) -> None:
 
 
 def text_of(table: Table) -> str:
-    """Return a table as text with aligned columns and six digits for each number."""
+    """Return a table as text with aligned columns and six significant digits."""
     table = columns(table)
     rows = [
         ["-" if v is None else f"{v:.6g}" if isinstance(v, float) else str(v) for v in row]

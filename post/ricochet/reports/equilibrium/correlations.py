@@ -34,8 +34,8 @@ from ..registry import Analysis
 from ..result import Result
 from ..tables import measured, over_runs, points
 
-PLAIN = {"walls"}  # the only special property allowed for Enskog's D
-#: Traits of a run that exclude equilibrium, but not the calculation of structure functions.
+PLAIN = {"walls"}  # the only trait with which Enskog's D applies
+#: Traits of a run that exclude equilibrium, but allow the calculation of structure functions.
 RESTLESS = (
     "inelastic",
     "soft_contacts",
@@ -46,8 +46,8 @@ RESTLESS = (
     "active",
     "sliding_surfaces",
 )
-FINE, COARSE = 0.01, 0.035  # widths of bins of distance, in mean diameters
-NEAR = 1.6  # distance up to which bins are narrow
+FINE, COARSE = 0.01, 0.035  # widths of distance bins [mean diameters]
+NEAR = 1.6  # distance up to which bins are narrow [mean diameters]
 DIFFUSION, ORDERS = ("D_displacement", "D_velocities"), ("psi6_local", "psi6_global")
 UNLIKE = 0.05  # largest relative difference of masses and radii of a species between combined runs
 
@@ -57,12 +57,12 @@ class Found(NamedTuple):
 
     members: dict[str, list[SeriesMean]]
     curves: dict[str, Curve]
-    lag: float | None  # lag of the diffusion coefficients [mean free times], or None
-    unit: float | None  # w sigma^2, in which D(t) is drawn if Enskog's D does not apply, or None
+    lag: float | None  # lag at which D is measured [mean free times], or None
+    unit: float | None  # w sigma^2, the unit of D(t) if Enskog's D does not apply, or None
 
 
 def check(run: Run) -> None:
-    """Raise an error if the system of a run is not homogeneous."""
+    """Raise an error if a run is inhomogeneous or too small."""
     allow(run, "correlations are those of disks without obstacles and gravity", *FLUID, *RESTLESS)
     if run.n_disks < 3:
         raise Refused(f"{run.path}: needs at least three disks")
@@ -71,7 +71,7 @@ def check(run: Run) -> None:
 
 
 def check_alike(runs: list[Run]) -> None:
-    """Raise an error if the species of the runs, which are to be combined, differ."""
+    """Raise RunError if the species of the runs, which are to be combined, differ."""
     kinds = [run.by_species for run in runs]
     for run, own in zip(runs, kinds, strict=True):
         same = [(k.name, k.disks.sum()) for k in own] == [(k.name, k.disks.sum()) for k in kinds[0]]
@@ -85,7 +85,7 @@ def check_alike(runs: list[Run]) -> None:
 
 
 def bins(run: Run) -> dict[str, np.ndarray]:
-    """Return the bins of distance and wavenumber; the unit of length is the mean diameter."""
+    """Return the bins of distance and wavenumber, in units based on the mean diameter."""
     half = 0.5 * run.edges.min() / (2 * run.radius.mean())
     least = float(run.radius.min() / run.radius.mean())
     found = {
@@ -96,7 +96,7 @@ def bins(run: Run) -> dict[str, np.ndarray]:
 
 
 def distances(least: float, most: float) -> np.ndarray:
-    """Return the edges of bins of distance, which are narrow up to NEAR: there g(r) is steep."""
+    """Return the edges of distance bins, which are narrow up to NEAR, where g(r) is steep."""
     near = np.arange(least, min(NEAR, most), FINE)
     return np.append(
         near, np.linspace(near[-1] + FINE, most, 1 + round(max(0, most - NEAR) / COARSE))
@@ -127,7 +127,7 @@ def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Cur
 
 
 def species(run: Run) -> tuple[str, ...]:
-    """Return the names of the species that are analysed separately: those of a mixture."""
+    """Return the names of the species if a run is a mixture, otherwise none."""
     return run.names if "mixture" in run.nature else ()
 
 
@@ -164,7 +164,7 @@ def motion(runs: list[Run], frames: list[slice], skip: float | None, wave: float
 
 
 def kurtosis(runs: list[Run], until: int) -> Curve:
-    """Return a2 in the first frames as a function of the number of collisions per disk."""
+    """Return a2 in the first frames as a function of collisions per disk."""
     tau, a2 = zip(*(relaxation(run, frames=until) for run in runs), strict=True)
     return Curve(np.mean(tau, axis=0), *estimate(a2))
 
@@ -200,7 +200,7 @@ def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Fo
 
 
 def enskog(run: Run) -> dict[str, float]:
-    """Return Enskog's D of equal disks, or of each species of a mixture; empty if it has none."""
+    """Return Enskog's D of equal disks, or of each species of a mixture; {} if it has none."""
     if run.nature <= PLAIN:
         return {"D_enskog": float(transport.enskog_of(run)["D"])}
     if not run.nature <= {*PLAIN, "mixture"} or not all(kind.alike for kind in run.by_species):
@@ -215,7 +215,7 @@ def enskog(run: Run) -> dict[str, float]:
 
 
 def table(groups: list[Group]) -> tuple[list[dict[str, Any]], list[str]]:
-    """Return a table row for each packing fraction, and warnings about the numbers."""
+    """Return a table row for each packing fraction, and warnings about its numbers."""
     rows, warnings = [], []
     kinds = dict.fromkeys(name for group in groups for name in species(group.runs[0]))
     ends = ["", *(f"_{name}" for name in kinds)]
@@ -236,7 +236,7 @@ def table(groups: list[Group]) -> tuple[list[dict[str, Any]], list[str]]:
 
 
 def curves(groups: list[Group]) -> list[dict[str, Any]]:
-    """Return a table that contains the numbers with errors, followed by all curve points."""
+    """Return a table of the numbers with errors, followed by all points of the curves."""
     names, rows = ("what", "packing", "x", "y", "error"), []
     for group in groups:
         found = group.values
@@ -269,13 +269,13 @@ LEVELS = {"vacf": 0, "F_s": 0, "alpha2": 0, "a2": 0, "g": 1, "S": 1}  # horizont
 
 
 def parts(shown: dict[str, Curve], panel: str) -> dict[str, Curve]:
-    """Return the curves of a panel by species or pair of species; the key "" means all disks."""
+    """Return the curves of a panel by species or pair of species, with "" for all disks."""
     names = [one for one in shown if one == panel or one.startswith(f"{panel}_")]
     return {one[len(panel) + 1 :]: shown[one] for one in names if one != "vacf_tail"}
 
 
 def in_time(axes: plt.Axes, curve: Curve, label: str | None = None, **style: Any) -> None:
-    """Draw a function of time with its error band; parts without an error are pale."""
+    """Plot a function of time with its error band; parts without an error are pale."""
     axes.plot(*curve[:2], **style, alpha=PALE)
     known = np.isfinite(curve.error)
     band(axes, *(np.where(known, part, np.nan) for part in curve), label=label, **style)
@@ -287,9 +287,10 @@ def positive(curve: Curve) -> Curve:
 
 
 def draw_parts(axes: plt.Axes, group: Group, panel: str, keyed: str) -> None:
-    """Draw the curves of all disks and of species or pairs of species.
+    """Plot the curves of all disks and of species or pairs of species.
 
-    They have names in the legend if `keyed` is not empty, and colours if it is "colours".
+    They are named in the legend if `keyed` is not empty, and distinguished by colour if it is
+    "colours".
     """
     own = parts(group.values.curves, panel)
     shades = ["black", *COLOURS] if keyed == "colours" and len(own) > 1 else [group.colour]
@@ -303,7 +304,7 @@ def draw_parts(axes: plt.Axes, group: Group, panel: str, keyed: str) -> None:
 
 
 def draw_tail(axes: plt.Axes, group: Group) -> None:
-    """Draw the velocity autocorrelation on logarithmic axes, with its long-time tail."""
+    """Plot the velocity autocorrelation with its long-time tail on logarithmic axes."""
     shown, line = group.values.curves, {"color": group.colour, "lw": 1}
     if "vacf" in shown:
         in_time(axes, positive(shown["vacf"]), marker=".", **line)
@@ -313,7 +314,7 @@ def draw_tail(axes: plt.Axes, group: Group) -> None:
 
 
 def draw_diffusion(axes: plt.Axes, group: Group, row: dict[str, Any]) -> None:
-    """Draw both diffusion coefficients in units of Enskog's coefficient, if it applies."""
+    """Plot both diffusion coefficients, divided by Enskog's value if his theory applies."""
     found = group.values
     unit = row["D_enskog"] or found.unit
     for name, marker in (("D_displacement(t)", "."), ("D_velocities(t)", "x")):
@@ -324,7 +325,7 @@ def draw_diffusion(axes: plt.Axes, group: Group, row: dict[str, Any]) -> None:
 
 
 def draw_panel(axes: plt.Axes, result: Result, name: str) -> None:
-    """Draw a function of all groups."""
+    """Plot a function for all groups."""
     groups = result.groups
     keyed = "colours" if len(groups) == 1 else "dashes"
     for group, row in zip(groups, result.table, strict=True):
@@ -357,7 +358,7 @@ def draw_panel(axes: plt.Axes, result: Result, name: str) -> None:
 
 
 def add_theory(axes: plt.Axes, result: Result, name: str) -> None:
-    """Add predictions and limits of a panel."""
+    """Add predictions and limits to a panel."""
     groups, known = result.groups, result.groups[0].runs[0].nature <= PLAIN
     if name == "vacf" and known:
         wt = np.geomspace(min(group.values.curves["vacf"].x[0] for group in groups), 5, 200)
@@ -383,7 +384,7 @@ def add_theory(axes: plt.Axes, result: Result, name: str) -> None:
 
 
 def told(group: Group, row: dict[str, Any]) -> str:
-    """Return the diffusion coefficients and the bond order as text."""
+    """Return diffusion coefficients and bond order as text."""
     text = f"η = {group.key:.3g}:"
     for name in ("", *species(group.runs[0])):
         key = f"D_displacement_{name}" if name else "D_displacement"
@@ -394,10 +395,10 @@ def told(group: Group, row: dict[str, Any]) -> str:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw all available time correlations and structure functions."""
+    """Plot all available time correlations and structure functions."""
     there = set().union(*(group.values.curves for group in result.groups))
     if max(len(group.values.curves["a2"].x) for group in result.groups) < 2:
-        there.remove("a2")  # the runs begin in equilibrium
+        there.remove("a2")  # the runs start in equilibrium
     of = {"tail": "vacf", "D": "D_displacement(t)"}
     names = [name for name in AXES if of.get(name, name) in there]
     rows = []

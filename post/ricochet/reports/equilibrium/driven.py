@@ -1,4 +1,4 @@
-"""Quantities of driven disks against time, with pictures of the disks."""
+"""Quantities of driven disks as functions of time, with pictures of the disks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,22 +22,19 @@ from ..result import Result
 from ..tables import measured, over_runs, with_all_columns
 
 MOST_PICTURES = 3
-POINTS, FINE = 60, 1000  # points of a curve, and of a curve whose fluctuations are of interest
-SMALLEST = 2.2  # smallest diameter of a drawn disk [points]
-LINES = ("-", "-.", ":")  # line styles of the inputs, if colours denote species
+POINTS, FINE = 60, 1000  # points of a curve, and of a curve with fluctuations of interest
+SMALLEST = 2.2  # smallest diameter of a disk in a picture [points]
+LINES = ("-", "-.", ":")  # line styles of the inputs if colours denote species
 Law = np.ndarray | float | Room | None
 
 
 def no_law(run: Run) -> None:
-    """Return no prediction."""
+    """Return None, for a quantity without a prediction."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Quantity of the figure.
-
-    The mean of `compared(values)` is compared with the prediction `law`.
-    """
+    """Quantity of the figure; its prediction `law` is for the mean of `compared(values)`."""
 
     label: str
     unit: str
@@ -65,20 +62,20 @@ QUANTITIES = {
 
 @dataclass
 class Found:
-    """Curves of a group by species, in the order of the runs, and their prediction."""
+    """Curves of a group by species, in the order of the runs, with their prediction."""
 
     tracks: dict[str, list[TimeSeries]]
     law: Law
 
 
 def check(run: Run) -> None:
-    """Raise an error for a run with one frame."""
+    """Raise RunError if a run has only one frame."""
     if run.n_frames < 2 or not run.time[-1] > run.time[0]:
         raise RunError(f"{run.path}: has one frame, two are required")
 
 
 def by_input(runs: list[Run]) -> list[tuple[str, list[Run]]]:
-    """Group runs that differ only by their seed; the keys describe how the groups differ."""
+    """Group runs that differ only in their seed; the keys say how the groups differ."""
     own = [{"N": run.n_disks, "ξ": run.restitution, **drawing.numbers_of(run)} for run in runs]
     names = [name for name in own[0] if len({numbers.get(name) for numbers in own}) > 1]
     groups: dict[str, list[Run]] = {}
@@ -91,13 +88,13 @@ def by_input(runs: list[Run]) -> list[tuple[str, list[Run]]]:
 
 
 def on_average(laws: list[Law]) -> Law:
-    """Return the mean prediction of runs that differ in their seed and their initial energy."""
+    """Return the mean prediction for runs that differ in their seed and initial energy."""
     rooms = all(isinstance(law, Room) for law in laws)
     return Room(*map(float, np.mean(laws, axis=0))) if rooms else laws[0]
 
 
 def found_in(runs: list[Run], quantity: Quantity) -> Found:
-    """Return the curves of runs, and the prediction."""
+    """Return the curves of runs with their prediction."""
     tracks: dict[str, list[TimeSeries]] = {}
     for run in runs:
         for species, curve in quantity.curves(run).items():
@@ -109,7 +106,7 @@ def found_in(runs: list[Run], quantity: Quantity) -> Found:
 
 
 def late(curve: TimeSeries, compared: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Return the values in the second half of a curve that are compared with the prediction."""
+    """Return those values in the second half of a curve that are compared with the prediction."""
     time, value = curve
     return compared(value[time >= (time[0] + time[-1]) / 2])
 
@@ -117,8 +114,8 @@ def late(curve: TimeSeries, compared: Callable[[np.ndarray], np.ndarray]) -> np.
 def members_of(group: Group, species: str, show: str, halves: list[np.ndarray]) -> list[SeriesMean]:
     """Return the mean over the second half of each run.
 
-    It has no error if the energy of the run is constant: its fluctuations do not show the scatter
-    over seeds.
+    A run of constant energy yields no error, because its fluctuations do not show the scatter over
+    seeds.
     """
     members = [correlated_mean(half) for half in halves]
     if show != "temperature" or species:
@@ -128,7 +125,7 @@ def members_of(group: Group, species: str, show: str, halves: list[np.ndarray]) 
 
 
 def components(runs: list[Run]) -> dict[str, float | None]:
-    """Return the table cells of kT_x and kT_y, if the runs contain them."""
+    """Return the table cells of kT_x and kT_y, if available."""
     if not all("kinetic_tensor" in run.observables for run in runs):
         return {}
     parts, row = [driven.components(run) for run in runs], {}
@@ -152,7 +149,7 @@ def deviations(
 def row_of(
     group: Group, species: str, show: str, compared: Callable, warnings: list[str]
 ) -> dict[str, Any]:
-    """Return the table row of all disks or a species, and add to `warnings`."""
+    """Return the table row of a species or all disks, and add to `warnings`."""
     curves = group.values.tracks[species]
     halves = [late(curve, compared) for curve in curves]
     about = ", ".join(filter(None, (show, group.key, species)))
@@ -177,7 +174,7 @@ def row_of(
 
 
 def levels(law: Law, compared: Callable) -> list:
-    """Return the values of a prediction that the figure shows as horizontal lines."""
+    """Return the values of a prediction that are drawn as horizontal lines."""
     if isinstance(law, Room):
         return [law.mean, law.mean - law.deviation, law.mean + law.deviation]
     return [] if law is None else [law, 1 - law] if compared is driven.fuller else [law]
@@ -186,7 +183,7 @@ def levels(law: Law, compared: Callable) -> list:
 def styles_of(result: Result) -> dict[tuple[str, str], dict[str, Any]]:
     """Return colour and line style of each curve.
 
-    A colour denotes an input or a species, also in the pictures of disks.
+    A colour denotes an input, or a species as in the pictures of disks.
     """
     kinds = any(species for group in result.groups for species in group.values.tracks)
     styles = {}
@@ -200,14 +197,14 @@ def styles_of(result: Result) -> dict[tuple[str, str], dict[str, Any]]:
 
 
 def group_colour(result: Result, k: int) -> str:
-    """Return a colour of a group that no species has in the pictures."""
+    """Return a colour for a group that differs from those of the species in the pictures."""
     names = result.runs[0].names
     first = len(names) if len(names) > 1 else 0
     return drawing.colours(len(result.groups), first)[k]
 
 
 def draw_curves(axes: plt.Axes, result: Result) -> None:
-    """Draw measured values as solid lines and predictions as dashed lines."""
+    """Plot measured values as solid lines and predictions as dashed lines."""
     quantity, styles = QUANTITIES[result.options.show], styles_of(result)
     fine = quantity.points == FINE
     for group in result.groups:
@@ -234,7 +231,7 @@ def draw_curves(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_picture(axes: plt.Axes, run: Run, frame: int, name: str, colour: str) -> None:
-    """Draw the disks of a frame; very small disks are enlarged."""
+    """Draw the disks in a frame, with very small disks enlarged."""
     drawing.draw_box(axes, run, run.time[frame])
     several = len(run.names) > 1
     shades = drawing.species_colours(run) if several else [colour] * run.n_disks
@@ -245,7 +242,7 @@ def draw_picture(axes: plt.Axes, run: Run, frame: int, name: str, colour: str) -
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the curves of a quantity, and below the curves the pictures of the disks."""
+    """Plot a quantity as a function of time, with pictures of the disks below."""
     groups, first = result.groups, result.runs[0]
     pictures = [(group.runs[0], -1, group.key, k) for k, group in enumerate(groups)]
     if len(groups) == 1:
@@ -267,7 +264,7 @@ def draw(result: Result) -> Sheet:
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Compare the quantity in the second half of the runs with its prediction."""
+    """Compare the mean of a quantity in the second half of the runs with its prediction."""
     quantity, warnings = QUANTITIES[options.show], []
     for group in groups:
         group.values = found_in(group.runs, quantity)

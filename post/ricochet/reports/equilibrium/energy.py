@@ -1,4 +1,4 @@
-"""Energies against time, and conservation of the total energy."""
+"""Energies as functions of time, and conservation of the total energy."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -14,20 +14,20 @@ from ..groups import Group, each_run
 from ..registry import Analysis
 from ..result import Result
 
-EPSILON = np.finfo(float).eps  # rounding unit of a number near 1
-WINDOWS = 60  # windows of time
+EPSILON = np.finfo(float).eps  # distance of 1 from the next larger number
+WINDOWS = 60  # time windows
 MOST_PANELS = 4
-ROUNDING = 1e-9  # largest relative change that rounding can explain
+ROUNDING = 1e-9  # largest relative change that rounding errors explain
 WHY_EXACT = "flights and collisions are exact except for rounding; larger steps miss collisions"
 
 
 def method(run: Run) -> str:
-    """Return the name of the simulation method of a run, for the legend of a figure."""
+    """Return the name of the simulation method of a run, for a legend."""
     return f"time steps, Δt = {run.time_step:g}" if run.time_step else "event driven"
 
 
 def balance(run: Run) -> tuple[np.ndarray, str]:
-    """Return the time series of the conserved quantity, and the names of the energies in it."""
+    """Return the conserved quantity as a function of time, and the names of the energies in it."""
     energy, words = run.observable("total_energy").value, "total"
     size = 1e-9 * np.abs(energy).max()
     for sign, term in ((1, "dissipated_energy"), (-1, "heat"), (-1, "work"), (-1, "drive_energy")):
@@ -39,7 +39,7 @@ def balance(run: Run) -> tuple[np.ndarray, str]:
 
 
 def change(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return the times and the relative changes of the conserved quantity."""
+    """Return times and relative changes of the conserved quantity."""
     time, total = run.observable("total_energy")
     if len(time) < 2:
         raise RunError(
@@ -64,7 +64,7 @@ def means_of_windows(
 
 
 def draw_species(axes: plt.Axes, run: Run, spaced: Callable) -> None:
-    """Draw kinetic (solid) and potential energies (dotted) of all species in windows of time.
+    """Plot kinetic (solid) and potential energies (dotted) of all species in time windows.
 
     `spaced` divides the time: `np.linspace`, or `np.geomspace` for a logarithmic axis.
     """
@@ -90,7 +90,7 @@ def draw_species(axes: plt.Axes, run: Run, spaced: Callable) -> None:
 
 
 def of_each_method(runs: list[Run]) -> list[Run]:
-    """Return the first run of each method and time step, but at most `MOST_PANELS` runs."""
+    """Return the first run of each method and time step, up to `MOST_PANELS` runs."""
     first: dict[float, Run] = {}
     for run in runs:
         first.setdefault(run.time_step, run)
@@ -98,7 +98,7 @@ def of_each_method(runs: list[Run]) -> list[Run]:
 
 
 def draw_total(axes: plt.Axes, run: Run, is_first: bool, is_left: bool) -> None:
-    """Draw the total energy of a run and its parts against time on linear axes."""
+    """Plot the total energy of a run and its parts as functions of time on linear axes."""
     time, total = run.observable("total_energy")
     axes.plot(time, total, color="black", lw=1.6, label="$E_{tot}$", zorder=3, **lone(time))
     for kind, style in (("kinetic", "-"), ("potential", ":")):  # as in the panel of species
@@ -119,7 +119,7 @@ def draw_total(axes: plt.Axes, run: Run, is_first: bool, is_left: bool) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw total energies, energies of each species, and changes of the conserved quantity."""
+    """Plot total energies, energies of each species, and changes of the conserved quantity."""
     runs = result.runs
     shown = of_each_method(runs)
     per_row = 2 if len(shown) == MOST_PANELS else max(1, len(shown))
@@ -143,7 +143,7 @@ def draw(result: Result) -> Sheet:
 
 
 def draw_changes(axes: plt.Axes, runs: list[Run]) -> None:
-    """Draw for each run the largest change of the conserved quantity up to each time."""
+    """Plot for each run the largest change of the conserved quantity up to each time."""
     worst = 0.0
     for run, colour in zip(runs, colours(len(runs), 2), strict=True):
         time, lost = change(run)
@@ -165,7 +165,7 @@ def draw_changes(axes: plt.Axes, runs: list[Run]) -> None:
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Return the drift, the scatter and the largest change of the conserved quantity."""
+    """Return drift, scatter and largest change of the conserved quantity."""
     rows = []
     for run in groups[0].runs:
         time, lost = change(run)

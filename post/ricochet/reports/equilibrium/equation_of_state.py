@@ -1,4 +1,4 @@
-"""Equation of state Z = P / (n kT) of hard disks against packing fraction, from three methods."""
+"""Equation of state Z = P / (n kT) of hard disks against packing fraction, by three methods."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -18,12 +18,12 @@ from ..registry import Analysis
 from ..result import Result
 from ..tables import columns, measured, over_runs
 
-UNLIKE = 0.02  # largest difference of <r>^2 / <r^2> in a figure
+UNLIKE = 0.02  # largest difference of <r>^2 / <r^2> within a figure
 WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the walls"}
 
 
 def likeness(runs: list[Run]) -> float:
-    """Return the ratio <r>^2 / <r^2> of the radii, which determines the theoretical curves."""
+    """Return <r>^2 / <r^2> of the radii r, on which the theoretical curves depend."""
     found = np.array([np.mean(run.radius) ** 2 / np.mean(run.radius**2) for run in runs])
     equal = np.array([np.ptp(run.radius) == 0 for run in runs])
     other = (np.abs(found - found[0]) > UNLIKE) | (equal != equal[0])
@@ -34,9 +34,9 @@ def likeness(runs: list[Run]) -> float:
 
 
 def table(groups: list[Group], skip: float | None) -> tuple[list[dict[str, Any]], list[str]]:
-    """Return a row for each packing fraction, and warnings.
+    """Return a row for each packing fraction, and a list of warnings.
 
-    The cells of methods that do not apply are empty.
+    Cells are empty where a method does not apply.
     """
     rows, warnings = [], []
     alike = likeness([run for group in groups for run in group.runs])
@@ -74,7 +74,7 @@ def fluids(result: Result) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
 
 
 def draw_points(axes: plt.Axes, found: dict[str, np.ndarray], deviations: bool) -> None:
-    """Draw Z of each method, or its deviation from the reference in percent."""
+    """Plot Z by each method, or its deviation from the reference in percent."""
     eta, expected = found["packing"], found["Z_reference"]
     for (name, way), marker, colour in zip(WAYS.items(), "oxs", COLOURS, strict=False):
         z, error = found[f"Z_{name}"], found[f"Z_{name}_error"]
@@ -87,7 +87,7 @@ def draw_points(axes: plt.Axes, found: dict[str, np.ndarray], deviations: bool) 
 
 
 def draw_z(axes: plt.Axes, result: Result) -> None:
-    """Draw Z with published equations of state."""
+    """Plot Z with published equations of state."""
     (alike, fluid, henderson, published), found = fluids(result), cells(result)
     rough = "Henderson 1975" if alike == 1 else "Santos et al. 1999, from Henderson's equation"
     label = "Kolafa and Rottner 2006; up to 0.65 Erpenbeck and Luban 1985; then this program"
@@ -99,7 +99,8 @@ def draw_z(axes: plt.Axes, result: Result) -> None:
         label = "crystal, Alder, Hoover and Young 1968"
         axes.plot(solid, hard_disks.crystal(solid), color="black", lw=1, ls="--", label=label)
     draw_points(axes, found, deviations=False)
-    most = np.nanmax([found[f"Z_{name}"] for name in WAYS])  # from the data, as the curves diverge
+    # determined by the data, because the curves diverge
+    most = np.nanmax([found[f"Z_{name}"] for name in WAYS])
     axes.set(ylabel="$Z = P\\,/\\,(n\\,kT)$", xlim=(0, 0.05 + max(found["packing"])))
     if most > 3:
         axes.semilogy()
@@ -111,7 +112,7 @@ def draw_z(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_deviation(axes: plt.Axes, result: Result) -> None:
-    """Draw the deviation of Z from a reference equation."""
+    """Plot the deviation of Z from a reference equation of state."""
     (_, fluid, henderson, published), found = fluids(result), cells(result)
     axes.plot(fluid, 100 * (henderson / published - 1), color="0.6")
     draw_points(axes, found, deviations=True)
@@ -125,7 +126,7 @@ def draw_deviation(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw Z, and its deviation from a reference equation."""
+    """Plot Z, and its deviation from a reference equation of state."""
     above = Panel("z", draw_z, (result,), aspect=0.6)
     below = Panel("deviation", draw_deviation, (result,), aspect=0.35, share_x="z")
     return Sheet([[above], [below]], caption(result.runs))

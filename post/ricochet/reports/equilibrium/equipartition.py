@@ -1,4 +1,4 @@
-"""Time after which the kinetic energies of two species under gravity are equal."""
+"""Time until two species under gravity have the same kinetic energy."""
 
 from collections.abc import Callable
 from functools import reduce
@@ -28,17 +28,17 @@ from ..registry import Analysis
 from ..result import Result
 from ..tables import measured
 
-RESAMPLED = 400  # random choices of the runs
+RESAMPLED = 400  # bootstrap samples of the runs
 
 
 class Approach(NamedTuple):
-    """Kinetic energies of the two species in consecutive windows of time."""
+    """Kinetic energies of two species in consecutive time windows."""
 
-    time: np.ndarray  # (W,) middles
+    time: np.ndarray  # (W,) centres of the windows
     light: Estimate  # (W,)
     heavy: Estimate
     gap: Estimate  # (W,) heavy / light - 1
-    thermalisation: Estimate  # NaN if they never agree or the error is too large
+    thermalisation: Estimate  # NaN if the energies never agree, or if the error is too large
 
 
 def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int = 3) -> float:
@@ -55,12 +55,13 @@ def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int =
 
 
 def approach(runs: list[Run], width: float, within: float) -> Approach:
-    """Return the mean energies of the lightest and heaviest species in each window of time."""
+    """Return the mean energies of the lightest and the heaviest species in each time window."""
     both = []
     for kind in lightest_and_heaviest(runs[0]):
         name = runs[0].names[kind]
         tracks = [windows(*run.observable(f"{name}/kinetic_energy"), width) for run in runs]
-        time = reduce(np.intersect1d, [middles for middles, _ in tracks])  # end of the shortest run
+        # up to the end of the shortest run
+        time = reduce(np.intersect1d, [middles for middles, _ in tracks])
         both.append(np.array([values[np.isin(middles, time)] for middles, values in tracks]))
     light, heavy = map(estimate, both)
     difference = estimate(both[1] - both[0])
@@ -78,10 +79,11 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
 def over_runs(of: Callable[[np.ndarray], float], both: list[np.ndarray]) -> Estimate:
     """Return a function of the mean energies (2, W) of R runs, with a bootstrap error.
 
-    `both` contains the energies (R, W) of two species. In 68 % of the random choices of R runs the
-    result deviates by less than the error; it is NaN if it is for all runs, or in more than 32 %.
-    The function jumps where noise raises a curve above a limit. The omission of one run, by the
-    jackknife, seldom causes a jump, but then a far too large error.
+    `both` holds the energies (R, W) of the two species. In 68 % of the bootstrap samples, random
+    choices of R runs, the result deviates by less than the error. The error is NaN if the result is
+    NaN for all runs, or in more than 32 % of the samples. A jackknife is unsuitable: the function
+    jumps where noise raises a curve above a limit, and the omission of one run seldom causes such a
+    jump, but then a far too large error.
     """
     tracks, count = np.array(both), len(both[0])
     mean = tracks.mean(axis=1)
@@ -106,18 +108,18 @@ def late(runs: list[Run], name: str, skip: float | None) -> Estimate:
 
 
 def start_width(run: Run) -> float:
-    """Return v0, which is the largest value of the input variable `speed`."""
+    """Return v0, the largest value of the input variable `speed`."""
     species = run.parameters.get("species", {})
     return max(float(species.get(name, {}).get("speed", 0.0)) for name in run.names)
 
 
 def by_start(runs: list[Run]) -> list[tuple[float, list[Run]]]:
-    """Runs with the same width v0 of the initial velocity distribution are combined."""
+    """Group runs with the same width v0 of the initial velocity distribution."""
     return grouped(runs, start_width)
 
 
 def draw_approach(axes: plt.Axes, group: Group, options: SimpleNamespace, labelled: bool) -> None:
-    """Draw the energies of both species against time for one v0."""
+    """Plot the energies of both species as functions of time for one v0."""
     first, found = group.runs[0], group.values
     order, shades = lightest_and_heaviest(first), colours(len(first.names))
     for k, energy in zip(order, (found.light, found.heavy), strict=True):
@@ -137,7 +139,7 @@ def draw_approach(axes: plt.Axes, group: Group, options: SimpleNamespace, labell
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the energies against time, in a separate panel for each v0."""
+    """Plot the energies as functions of time in a separate panel for each v0."""
     last, rows = len(result.groups) - 1, []
     for k, group in enumerate(result.groups):
         more = {"aspect": 0.34 + 0.05 * (k == last), "share_x": "start1" * (k > 0)}
@@ -147,12 +149,12 @@ def draw(result: Result) -> Sheet:
 
 
 def check(run: Run) -> None:
-    """Raise an error unless the species of a run reach a common temperature."""
+    """Raise Refused unless the species of a run reach a common temperature."""
     allow(run, "its species do not reach a common temperature", *SETTLED)
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Return T_therm and the energies in equilibrium for each v0."""
+    """Return T_therm, and the energies in equilibrium, for each v0."""
     rows, warnings, share = [], [], f"{100 * options.within:g} %"
     for group in groups:
         runs = group.runs

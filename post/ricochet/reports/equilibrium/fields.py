@@ -36,10 +36,10 @@ from ..tables import Table, measured, spread
 MOST_CELLS = 100_000
 LEAST_FLOW = 0.2  # smallest range of the axis of a flow velocity [thermal speeds]
 SIGNIFICANT = 5.99  # 95 % quantile of chi^2 with two degrees of freedom
-#: Significant mean of the squared differences of kT_x and kT_y, in units of the squared errors.
+#: Mean squared difference of kT_x and kT_y, relative to the squared errors, that is significant.
 UNEQUAL = 9.0
-BELOW = {"location": "bottom", "pad": 0.03, "aspect": 25}  # place of a colour bar
-#: Text and unit of the axis label of each field.
+BELOW = {"location": "bottom", "pad": 0.03, "aspect": 25}  # position of a colour bar
+#: Axis label of each field: text and quantity.
 LABELS = {
     "density": ("number density n", "number density"),
     "flow_x": ("flow $u_x$", "speed"),
@@ -58,7 +58,7 @@ Law = dict[str, Estimate]  # predicted profiles
 
 
 class Found(NamedTuple):
-    """Fields in cells, with the predicted profiles, or with the stream function of a map."""
+    """Fields in cells, with the predicted profiles or, for a map, the stream function."""
 
     own: Fields
     cells: tuple[int, int]
@@ -71,7 +71,7 @@ class Found(NamedTuple):
 
 
 def draw_panel(axes: plt.Axes, result: Result, name: str) -> None:
-    """Draw a field against the position along an axis."""
+    """Plot a field as a function of position along an axis."""
     run, found = result.runs[0], result.values
     of = found.own.found
     x = places(run, found.cells)[:, found.axis]
@@ -106,7 +106,7 @@ def names_of(panel: str, found: dict[str, Estimate], axis: int) -> list[str]:
 
 
 def draw_walls(axes: plt.Axes, run: Run, axis: int, name: str) -> None:
-    """Draw the temperature ('kT') or the velocity ('flow') of thermal walls as squares."""
+    """Mark the temperature ('kT') or the velocity ('flow') of thermal walls by squares."""
     for k, wall in enumerate(walls(run, axis)):
         style = {"marker": "s", "color": "black", "ls": "none", "clip_on": False, "zorder": 3}
         axes.plot(wall["x"], wall[name], label="wall" if k == 0 else None, **style)
@@ -122,7 +122,7 @@ def unequal(found: dict[str, Estimate]) -> bool:
 
 
 def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names: str) -> None:
-    """Draw points with error bars; there is a gap for each cell without disks."""
+    """Plot points with error bars, leaving a gap for each cell without disks."""
     there = [name for name in names if name in found]
     for name in there:
         label = LABELS[name][0] if len(there) > 1 else "measured"
@@ -132,7 +132,7 @@ def draw_fields(axes: plt.Axes, units: Units, x: np.ndarray, found: dict, *names
 
 
 def with_ends(run: Run, axis: int, x: np.ndarray) -> np.ndarray:
-    """Return positions x, extended at both ends by the outermost possible centre positions."""
+    """Return positions x, extended at both ends to the outermost positions of centres."""
     reach = run.radius[0]
     return np.concatenate([[run.lower[axis] + reach], x, [run.upper[axis] - reach]])
 
@@ -153,7 +153,7 @@ def walls(run: Run, axis: int) -> list[dict]:
 
 
 def at_walls(run: Run, axis: int, law: dict) -> list[dict]:
-    """Return kT and velocity of each wall, and the predicted values of the gas next to the wall."""
+    """Return kT and velocity of each wall, and those predicted for the gas beside it."""
     rows = []
     for wall in walls(run, axis):
         end = 0 if wall["wall"] == ACROSS[axis][0] else -1
@@ -168,15 +168,15 @@ def at_walls(run: Run, axis: int, law: dict) -> list[dict]:
 
 
 class Flow(NamedTuple):
-    """Mean flow in the cells of a grid."""
+    """Mean flow velocity in the cells of a grid."""
 
-    u: np.ndarray  # (2, C) along x and y [speed]
-    significant: np.ndarray  # (C,) whether the flow differs from 0 by more than its error explains
-    known: bool  # whether errors are known
+    u: np.ndarray  # (2, C) components along x and y
+    significant: np.ndarray  # (C,) whether the flow differs significantly from 0
+    known: bool  # whether the errors are known
 
 
 def flow_of(found: dict[str, Estimate]) -> Flow:
-    """Return the measured mean flow."""
+    """Return the measured mean flow velocity."""
     parts = [found[name] for name in ("flow_x", "flow_y")]
     u, error = (np.array([part[k] for part in parts]) for k in (0, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -185,9 +185,10 @@ def flow_of(found: dict[str, Estimate]) -> Flow:
 
 
 def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, colour: str) -> None:
-    """Draw the flow as arrows, which are pale in cells without significant flow.
+    """Draw the flow as arrows, pale in cells without significant flow.
 
-    The largest significant flow, or the largest flow if none is, has an arrow as long as a cell.
+    The largest significant flow, or the largest flow if none is significant, is represented by an
+    arrow as long as a cell.
     """
     size = np.hypot(*flow.u)
     shown = size[flow.significant] if flow.significant.any() else size
@@ -205,7 +206,7 @@ def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, co
 
 
 def draw_map(axes: plt.Axes, result: Result, name: str) -> None:
-    """Draw a map of a field."""
+    """Plot a field as a map."""
     run, found = result.runs[0], result.values
     draw_box(axes, run)
     values = found.own.found[name].mean.reshape(found.cells[::-1])
@@ -224,21 +225,22 @@ def draw_flow(axes: plt.Axes, result: Result) -> None:
 
 
 def sides_of(run: Run, cells: tuple[int, int]) -> list[np.ndarray]:
-    """Return the sides of the cells along x (NX + 1,) and y (NY + 1,)."""
+    """Return the edges of the cells along x (NX + 1,) and y (NY + 1,)."""
     return [np.linspace(run.lower[k], run.upper[k], cells[k] + 1) for k in (0, 1)]
 
 
 def clip(axes: plt.Axes, run: Run, *maps: Artist) -> None:
-    """Hide the parts of maps that are outside of a round container."""
+    """Hide the parts of maps outside a round container."""
     for one in (obstacle for obstacle in run.obstacles if obstacle.inside):
         for each in maps:
             each.set_clip_path(Circle(one.centre, one.radius, transform=axes.transData))
 
 
 def draw_stream(axes: plt.Axes, run: Run, sides: list[np.ndarray], psi: np.ndarray) -> None:
-    """Draw a stream function (NY + 1, NX + 1) as colours with contour lines."""
+    """Plot a stream function (NY + 1, NX + 1) in colour, with contour lines."""
     top = float(np.abs(psi).max()) or 1.0
-    levels = np.linspace(-top, top, 16)  # even: no line at 0, where noise dominates
+    # an even number, without a line at 0, where noise dominates
+    levels = np.linspace(-top, top, 16)
     filled = axes.contourf(*sides, psi, levels, cmap="RdBu_r", zorder=0.2)
     lines = axes.contour(*sides, psi, levels, colors="0.5", linewidths=0.5, zorder=0.3)
     clip(axes, run, filled, lines)
@@ -248,7 +250,7 @@ def draw_stream(axes: plt.Axes, run: Run, sides: list[np.ndarray], psi: np.ndarr
 
 
 def draw(result: Result) -> Sheet:
-    """Draw maps of the fields, or profiles."""
+    """Plot the fields as maps or profiles."""
     run, name = result.runs[0], result.options.species
     title = titled(result.runs)
     if name is not None:
@@ -266,7 +268,7 @@ def draw(result: Result) -> Sheet:
 
 
 def cells_of(text: str) -> tuple[int, ...]:
-    """Convert a text to the numbers of cells, N for a profile or (NX, NY) for a map."""
+    """Convert a text to numbers of cells, N for a profile or (NX, NY) for a map."""
     cells = tuple(int(word) for word in text.split(","))
     if min(cells) < 1 or not 2 <= np.prod(cells) <= MOST_CELLS:
         raise argparse.ArgumentTypeError(f"the number of cells must be 2 to {MOST_CELLS}")
@@ -274,7 +276,7 @@ def cells_of(text: str) -> tuple[int, ...]:
 
 
 def chosen_cells(options: SimpleNamespace, axis: int) -> tuple[int, int]:
-    """Return the numbers of cells along x and y that the options select."""
+    """Return the numbers of cells along x and y given by the options."""
     if options.grid and options.cells is not None:
         raise RunError("--grid is not allowed with --cells")
     number = (20,) if options.cells is None else tuple(np.ravel(options.cells).tolist())
@@ -288,7 +290,7 @@ def chosen_cells(options: SimpleNamespace, axis: int) -> tuple[int, int]:
 
 
 def warnings_of(groups: list[Group], options: SimpleNamespace, own: Fields) -> list[str]:
-    """Return reasons for which the state is not steady, or for which errors are unknown."""
+    """Return reasons why the state may not be steady, or why errors are unknown."""
     runs = [run for group in groups for run in group.runs]
     cooling = [run.path.name for run in runs if run.nature.cooling]
     warnings = motion_notes(runs)
@@ -303,7 +305,7 @@ def warnings_of(groups: list[Group], options: SimpleNamespace, own: Fields) -> l
 
 
 def with_theory(runs: list[Run], own: Fields, axis: int, x: np.ndarray) -> tuple[Law | None, Table]:
-    """Return the predicted profiles, and a table with the measured fluxes."""
+    """Return the predicted profiles, and a table of the measured fluxes."""
     if not has_theory(runs, axis):
         return None, []
     law, flux = prediction(own, axis, with_ends(runs[0], axis, x))

@@ -21,14 +21,15 @@ from ..tables import measured
 
 SPEED_RANGE = (0.0, 5.0)  # range of m v^2 / 2 kT
 HEIGHT_RANGE = (1.0, 5.0)  # range of m g h / kT
-BLOCKS = 10  # blocks of time, for errors
-FEWEST_VALUES = 20  # smallest number of values from which a slope is determined
+BLOCKS = 10  # blocks of time from which errors are estimated
+FEWEST_VALUES = 20  # fewest values from which a slope is determined
 STEEPEST = 500.0  # largest decay constant times the range of a fit
-CROWDED = 0.5  # excluded fraction of the area at the floor up to which the first order is used
+# largest excluded fraction of the area at the floor for which the first order is used
+CROWDED = 0.5
 
 
 class Samples(NamedTuple):
-    """Samples (F, n) of n disks of a species in F frames: v^2, v_x^2 and height."""
+    """Samples (F, n) of v^2, v_x^2 and height for n disks of a species in F frames."""
 
     mass: float
     radius: float
@@ -38,7 +39,7 @@ class Samples(NamedTuple):
 
 
 def samples(run: Run, kind: Species, frames: list[int]) -> Samples:
-    """Return the squared speeds and the heights of all disks of a species in the given frames."""
+    """Return the squared speeds and heights of all disks of a species in the given frames."""
     squares = run.velocity[frames][:, kind.disks] ** 2
     height = run.position[frames][:, kind.disks, 1] - (run.lower[1] + kind.radius)
     return Samples(kind.mass, kind.radius, squares.sum(axis=2), squares[..., 0], height)
@@ -47,8 +48,9 @@ def samples(run: Run, kind: Species, frames: list[int]) -> Samples:
 def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
     """Return the decay constant of exponentially distributed values between two limits.
 
-    It is the maximum-likelihood estimate, with which the truncated distribution has the mean of the
-    values. Nearly empty bins would increase the scatter of a line through a histogram by a third.
+    It is the maximum-likelihood estimate, for which the mean of the truncated distribution equals
+    that of the values. A line fitted to a histogram would scatter by a third more, owing to nearly
+    empty bins.
     """
     inside = values[(values >= limits[0]) & (values <= limits[1])]
     reach = limits[1] - limits[0]
@@ -65,7 +67,7 @@ def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
 def fit_limits(
     reach: tuple[float, float], law: float, largest: float = np.inf
 ) -> tuple[float, float]:
-    """Return the limits of a fit, which ends at the largest value that a disk can have."""
+    """Return the limits of a fit, which ends at the largest value possible for a disk."""
     return reach[0] / law, min(reach[1] / law, largest)
 
 
@@ -74,9 +76,9 @@ def slope_of(
 ) -> Estimate:
     """Return the decay constant of values (F, n), divided by that of the law, with its error.
 
-    `reach` is the range of the fit in kT, and `largest` the largest possible value of a disk.
-    `laws` (BLOCKS + 1,) are slopes for the mean kT of all frames, and of those without each block
-    (jackknife).
+    `reach` is the range of the fit in kT, and `largest` the largest value possible for a disk.
+    `laws` (BLOCKS + 1,) are the slopes for the mean kT of all frames, and of all frames but those
+    of each block (jackknife).
     """
 
     def over(law: float, own: np.ndarray) -> float:
@@ -91,14 +93,14 @@ def slope_of(
 
 
 def blocks_of(frames: int) -> list[np.ndarray]:
-    """Return the frames that belong to each block of time."""
+    """Return the frames of each block of time."""
     return np.array_split(np.arange(frames), BLOCKS)
 
 
 def warmth(species: list[Samples]) -> np.ndarray:
-    """Return the mean kinetic energy, (BLOCKS + 1,), over that of all frames.
+    """Return the mean kinetic energy over that of all frames, (BLOCKS + 1,).
 
-    The first ratio, that of all frames, is 1; the others leave out one block of time each.
+    The first ratio, for all frames, is 1; each of the others leaves out one block of time.
     """
     energy = np.sum([0.5 * s.mass * s.square.sum(axis=1) for s in species], axis=0)
     rests = [np.delete(energy, own) for own in blocks_of(len(energy))]
@@ -113,7 +115,7 @@ def sharers(run: Run) -> float:
 
 
 def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
-    """Return the statistical weight of an energy of one disk, if the total energy is fixed."""
+    """Return the statistical weight of the energy of one disk at fixed total energy."""
     if np.isinf(count):
         return np.exp(-energy / temperature)
     return np.maximum(1 - energy / (2 * count * temperature), 0) ** (2 * count - 2)
@@ -124,8 +126,8 @@ def crowded_heights(
 ) -> list[np.ndarray]:
     """Return the densities at heights (H,), corrected to first order for the excluded area.
 
-    The area is `width` wide for the centres of disks; a disk does not exclude itself. `share` disks
-    have a fixed total energy, infinitely many with a heat bath.
+    The area that disk centres can reach is `width` wide; a disk does not exclude itself. `share`
+    disks have a fixed total energy, infinitely many if there is a heat bath.
     """
     numbers = [s.height.shape[1] for s in species]
     ideal = [sharing(s.mass * pull * height, kt, share) for s in species]
@@ -144,12 +146,12 @@ def crowded_heights(
 
 
 def normalised(x: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the values of a density after normalising its integral to 1."""
+    """Normalise the integral of a density to 1."""
     return weight / np.trapezoid(weight, x)
 
 
 def law_slope(x: np.ndarray, density: np.ndarray, limits: tuple[float, float], count: int) -> float:
-    """Return the slope that `log_slope` would determine from `count` samples of a known density."""
+    """Return the slope that `log_slope` would find for `count` samples of a known density."""
     integral = scipy.integrate.cumulative_trapezoid(density, x, initial=0)
     ranks = (np.arange(count) + 0.5) / count
     return log_slope(np.interp(ranks, integral / integral[-1], x), limits)
@@ -163,7 +165,7 @@ def crowding(run: Run, species: list[Samples], kt: float) -> float:
 
 
 def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return the heights that centres can reach, and densities (NaN at large excluded area)."""
+    """Return heights that centres can reach, and their densities (NaN if too much is excluded)."""
     free = run.edges - 2 * species[0].radius
     grid = np.linspace(0, free[1], 4001)
     if crowding(run, species, kt) > CROWDED:
@@ -172,7 +174,7 @@ def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, li
 
 
 def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[dict[str, Any]]:
-    """Return the ratios of the fitted slopes to the slopes of the solid and of the dashed lines."""
+    """Return the fitted slopes relative to those of the solid and the dashed lines."""
     temperature = kt[0]
     grid, crowded = heights(run, species, temperature)
     rows, warm = [], warmth(species)
@@ -202,7 +204,7 @@ class Laws(NamedTuple):
     x: np.ndarray  # (P,) squared speeds or heights
     values: np.ndarray  # (F, n)
     ideal: np.ndarray  # (P,) exponential law
-    finite: np.ndarray  # (P,) law for the finite number and size of the disks
+    finite: np.ndarray  # (P,) law for disks of finite number and size
 
 
 def speed_laws(run: Run, species: list[Samples], kt: float) -> list[Laws]:
@@ -228,7 +230,7 @@ def height_laws(run: Run, species: list[Samples], kt: float) -> list[Laws]:
 
 
 def draw_histogram(axes: plt.Axes, values: np.ndarray, top: float, colour: str, label: str) -> None:
-    """Draw a normalised histogram with error bars."""
+    """Plot a normalised histogram with error bars."""
     bins = np.linspace(0, top, 51)
     blocks = np.array_split(values, min(BLOCKS, len(values)))
     parts = [binned(part.ravel(), bins).mean for part in blocks]
@@ -237,7 +239,7 @@ def draw_histogram(axes: plt.Axes, values: np.ndarray, top: float, colour: str, 
 
 
 def draw_laws(axes: plt.Axes, result: Result, kind: str, logarithmic: bool) -> None:
-    """Draw the histograms of squared speeds ('speed') or heights ('height') with both laws."""
+    """Plot the histograms of squared speeds ('speed') or heights ('height') with both laws."""
     run, species = result.runs[0], result.values
     laws_of, quantity = (
         (speed_laws, "squared speed") if kind == "speed" else (height_laws, "length")
@@ -269,9 +271,9 @@ def draw_laws(axes: plt.Axes, result: Result, kind: str, logarithmic: bool) -> N
 
 
 def draw(result: Result) -> Sheet:
-    """Draw histograms of squared speeds (top) and heights (bottom).
+    """Plot histograms of squared speeds (top) and heights (bottom).
 
-    The left panels have linear axes, the right panels logarithmic ones.
+    The left panels have linear axes, the right ones logarithmic axes.
     """
     run, row, rows = result.runs[0], result.table[0], []
     for kind, name in (("speed", "speeds"), ("height", "heights")):
@@ -285,7 +287,7 @@ def draw(result: Result) -> Sheet:
 
 
 def check(run: Run) -> None:
-    """Raise an error unless the exponential laws apply to a run."""
+    """Raise Refused unless the exponential laws apply to a run."""
     known = "walls", "gravity", "mixture", "thermal_walls", "thermostatted", "time_stepped"
     allow(run, "the exponential laws do not apply to it", *known)
 

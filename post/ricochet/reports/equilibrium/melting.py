@@ -32,7 +32,7 @@ def table(groups: list[Group], skip: float | None) -> tuple[list[dict[str, Any]]
 
 
 def draw_pressures(axes: plt.Axes, result: Result) -> None:
-    """Draw the measured values as points with error bars, and published values as lines."""
+    """Plot measured values as points with error bars, and published values as lines."""
     for (name, points), style in zip(MELTING.items(), (":", "--", "-"), strict=True):
         axes.plot(*np.transpose(points), ls=style, color="0.4", lw=1, label=name)
     for group in result.groups:
@@ -45,19 +45,19 @@ def draw_pressures(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the pressures."""
+    """Plot the pressures."""
     panel = Panel("pressure", draw_pressures, (result,), aspect=0.65)
     return Sheet([[panel]], caption(result.runs))
 
 
 def check(run: Run) -> None:
-    """Raise an error unless the disks are equal and the box is periodic."""
+    """Raise Refused unless the disks are equal and the box is periodic."""
     known = "thermostatted", "rough", "rotating"
     allow(run, "the melting curve is for equal disks in a periodic box", *known)
 
 
 def by_system(runs: list[Run]) -> list[tuple[tuple[int, float], list[Run]]]:
-    """Runs with the same number of disks and the same packing fraction are averaged."""
+    """Group runs with the same number of disks and packing fraction."""
     return [((n, eta), same) for n, own in by_number(runs) for eta, same in by_packing(own)]
 
 

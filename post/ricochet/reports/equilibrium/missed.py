@@ -1,4 +1,4 @@
-"""Fraction of collisions that time-stepped simulations fail to detect."""
+"""Fraction of collisions missed by time-stepped simulations."""
 
 from itertools import combinations_with_replacement
 from math import comb
@@ -20,11 +20,11 @@ from ..registry import Analysis
 from ..result import Result
 from ..tables import measured
 
-SPEEDS = np.linspace(0, 12, 2001)  # in units of sqrt(kT / mu)
+SPEEDS = np.linspace(0, 12, 2001)  # relative speeds [sqrt(kT / mu)]
 
 
 def missed_share(q: np.ndarray) -> np.ndarray:
-    """Return P(q), the mean probability that a collision is missed, where q = g dt / s."""
+    """Return P(q), the mean probability of missing a collision, where q = g dt / s."""
     q = np.asarray(q, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         short = np.minimum(q, 1)
@@ -49,7 +49,7 @@ def expected_share(run: Run, step: float, temperature: float) -> float:
 
 
 def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, float]:
-    """Return the number of pair collisions per disk and unit of time, and kT, in equilibrium."""
+    """Return the equilibrium values of the pair-collision rate per disk and of kT."""
     time, tau = run.collisions_per_disk
     first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if first >= len(time) - 1:
@@ -61,8 +61,8 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, floa
 def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimate:
     """Return the fraction of missed collisions from pairs of runs with equal seeds.
 
-    Its error is that of the scatter of the pairs or, for one pair, of the fluctuations of both
-    rates.
+    Its error is that of the scatter of the pairs or, for a single pair, that of the fluctuations of
+    both rates.
     """
     shares = [1 - one.mean / other.mean for one, other in zip(rates, exact, strict=True)]
     if rates == exact:
@@ -96,7 +96,7 @@ def compare(runs: list[Run], skip: float | None) -> list[dict[str, Any]]:
 
 
 def draw_missed(axes: plt.Axes, result: Result) -> None:
-    """Draw the measured and the predicted fraction of missed collisions against dt."""
+    """Plot the measured and the predicted fraction of missed collisions against dt."""
     run, rows = result.runs[0], result.table[1:]
     names = ("dt", "missed_percent", "missed_percent_error")
     dt, share, error = (np.array([row[name] for row in rows]) for name in names)
@@ -122,12 +122,12 @@ def draw_missed(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the fraction of missed collisions."""
+    """Plot the fraction of missed collisions."""
     return Sheet([[Panel("missed", draw_missed, (result,), aspect=0.65)]], caption(result.runs))
 
 
 def by_step(runs: list[Run]) -> list[tuple[float, list[Run]]]:
-    """Runs with the same time step are averaged."""
+    """Group runs with the same time step."""
     return grouped(runs, lambda run: run.time_step)
 
 

@@ -1,4 +1,4 @@
-"""Speeds and energies of each species of a mixture, at the start and in equilibrium."""
+"""Speeds and energies of each species of a mixture, initially and in equilibrium."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -34,7 +34,7 @@ def pooled(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:
 def table(
     runs: list[Run], frames: list[list[int]], skip: float | None = None
 ) -> list[dict[str, Any]]:
-    """Return mean speed and energy of each species, at the start and in equilibrium."""
+    """Return mean speed and energy of each species, initially and in equilibrium."""
     rows = []
     for kind in kinds_of_disks(runs[0]):
         name, mass = kind.name, kind.mass
@@ -62,7 +62,7 @@ def table(
 
 
 def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
-    """Return about 60 bins of speed up to `top`; a common initial speed is the centre of a bin."""
+    """Return about 60 speed bins up to `top`, with any common initial speed at a bin centre."""
     speed, width = float(np.mean(start)), top / BINS
     if 0 < speed < top and np.ptp(start) < 1e-9 * speed:
         width = speed / max(1, round(speed / width))
@@ -70,7 +70,7 @@ def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
 
 
 def draw_start(axes: plt.Axes, result: Result, kind: Species, bins: np.ndarray) -> None:
-    """Draw the speeds of a species at the start."""
+    """Plot the initial speeds of a species."""
     row = row_of(result, kind)
     speeds = pooled(result.runs, [[0]] * len(result.runs), kind.name)
     draw_speeds(axes, result, kind, speeds, bins)
@@ -80,7 +80,7 @@ def draw_start(axes: plt.Axes, result: Result, kind: Species, bins: np.ndarray) 
 
 
 def draw_late(axes: plt.Axes, result: Result, kind: Species, bins: np.ndarray) -> None:
-    """Draw the speeds of a species in equilibrium, and the Maxwell distribution."""
+    """Plot the speeds of a species in equilibrium with the Maxwell distribution."""
     row = row_of(result, kind)
     draw_speeds(axes, result, kind, pooled(result.runs, result.values, kind.name), bins)
     thermal = np.sqrt(2 * row["K_theory"] / kind.mass)
@@ -97,7 +97,7 @@ def draw_late(axes: plt.Axes, result: Result, kind: Species, bins: np.ndarray) -
 def draw_speeds(
     axes: plt.Axes, result: Result, kind: Species, speeds: np.ndarray, bins: np.ndarray
 ) -> None:
-    """Draw a histogram of speeds with its error bars."""
+    """Plot a histogram of speeds with its error bars."""
     run = result.runs[0]
     colour = COLOURS[run.names.index(kind.name) % len(COLOURS)]
     style = {"color": colour, "label": f"{kind.label}: {len(speeds)} speeds"}
@@ -108,12 +108,12 @@ def draw_speeds(
 
 
 def row_of(result: Result, kind: Species) -> dict[str, Any]:
-    """Return the row of the table that describes a species."""
+    """Return the row of the table for a species."""
     return next(row for row in result.table if row["species"] == kind.name)
 
 
 def draw(result: Result) -> Sheet:
-    """Draw two panels for each species: the speeds at the start and in equilibrium."""
+    """Plot the speeds of each species initially and in equilibrium, in two panels."""
     runs, frames, rows = result.runs, result.values, []
     top = max(np.quantile(pooled(runs, frames, name), 0.9995) for name in runs[0].names)
     for kind in runs[0].by_species:
@@ -125,7 +125,7 @@ def draw(result: Result) -> Sheet:
 
 
 def check(run: Run) -> None:
-    """Raise an error unless the species of a mixture exchange energy."""
+    """Raise Refused unless the species of a mixture exchange energy."""
     if len(run.names) < 2 or run.n_disks < 3:
         raise Refused(f"{run.path}: {NEEDED}")
     allow(run, "its species do not reach a common temperature", *SETTLED)

@@ -19,9 +19,9 @@ from ..registry import Analysis
 from ..result import Result
 from ..tables import points
 
-BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
-BLOCKS = 8  # number of blocks of frames of a single run
-#: Traits of runs with straight free flights whose lengths have the same distribution everywhere.
+BINS = np.linspace(0, 6, 49)  # free paths over their mean
+BLOCKS = 8  # number of blocks of frames in a single run
+#: Traits of runs with straight free flights whose lengths are distributed alike everywhere.
 STRAIGHT = {
     "walls",
     "mixture",
@@ -35,7 +35,7 @@ STRAIGHT |= {"thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 
 
 def check(run: Run) -> None:
-    """Raise an error if a system contains obstacles or gravity."""
+    """Raise Refused if a run has obstacles, gravity or other forces."""
     allow(run, "rates are those of a gas without obstacles and gravity", *td.FLUID, *STRAIGHT)
     if not run.nature.in_equilibrium and not td.has_log(run):
         needs = "only free paths are defined for it, and they require output.event_log = .true."
@@ -43,14 +43,14 @@ def check(run: Run) -> None:
 
 
 def scales(runs: list[Run]) -> np.ndarray:
-    """Return the factors by which kT of each run is scaled to the mean kT."""
+    """Return the factors that scale kT of each run to the mean kT."""
     kept = all(run.nature.keeps_kinetic_energy for run in runs)
     kts = np.array([td.kt_at_start(run) if kept else 1.0 for run in runs])
     return kts.mean() / kts
 
 
 def over_all(runs: list[Run], skip: float | None, warnings: list[str]) -> dict[str, SeriesMean]:
-    """Return all results with errors; each run is scaled to the mean temperature of all runs."""
+    """Return all results with errors, scaling each run to the mean temperature of all runs."""
     kts = scales(runs)
     found = [td.rates(run, skip) for run in runs]
     means = {}
@@ -63,7 +63,7 @@ def over_all(runs: list[Run], skip: float | None, warnings: list[str]) -> dict[s
 
 
 def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
-    """Return the mean pressure of the runs against time, from the virial and from the sides."""
+    """Return the mean pressure of the runs as a function of time, by virial and by sides."""
     cuts = np.linspace(0, min(run.collisions_per_disk.time[-1] for run in runs), FINE + 1)
 
     def growth(*parts: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -110,10 +110,10 @@ def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndar
 def mean_and_density(
     runs: list[Run], skip: float | None = None
 ) -> tuple[Estimate, Estimate] | None:
-    """Return the mean free path and the probability density of free paths in units of it.
+    """Return the mean free path, and the probability density of free paths over their mean.
 
-    The errors are those of the scatter of runs or, for a single run, of blocks of frames. Without
-    an event log, the result is None.
+    The errors are estimated from the scatter of the runs or, for a single run, of blocks of frames.
+    Without an event log, the result is None.
     """
     parts = [free_paths(run, skip) for run in runs if td.has_log(run)]
     if not parts or sum(len(path) for path, _ in parts) == 0:
@@ -136,14 +136,15 @@ def mean_and_density(
 class Found(NamedTuple):
     """Results of all runs."""
 
-    start: float  # of equilibrium
+    start: float  # start of the equilibrium
     means: dict[str, SeriesMean]
-    pressures: dict[str, Curve]  # against time
-    paths: tuple[Estimate, Estimate] | None  # mean free path, density of reduced free paths
+    pressures: dict[str, Curve]  # as functions of time
+    # mean free path, and density of free paths over their mean
+    paths: tuple[Estimate, Estimate] | None
 
 
 def draw_pressure(axes: plt.Axes, result: Result) -> None:
-    """Draw the pressure against time with its error, and the mean pressure in equilibrium."""
+    """Plot the pressure as a function of time with its error, and its mean in equilibrium."""
     found, units = result.values, result.runs[0].units
     mean, x = found.means["pressure_virial"], found.pressures["virial"].x
     end = x[-1] + x[0]
@@ -159,7 +160,7 @@ def draw_pressure(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_paths(axes: plt.Axes, result: Result) -> None:
-    """Draw the measured distribution of free paths and the prediction for molecular chaos."""
+    """Plot the measured distribution of free paths and the prediction of molecular chaos."""
     mean, height = result.values.paths
     label = f"measured, $\\ell$ = {' ± '.join(statistics.rounded_to_error(*mean))}"
     bars(axes, height, BINS, color=COLOURS[0], label=label)
@@ -174,7 +175,7 @@ def draw_paths(axes: plt.Axes, result: Result) -> None:
 def table(
     runs: list[Run], start: float, means: dict[str, SeriesMean], path: Estimate | None
 ) -> list[dict[str, Any]]:
-    """Return a table row for each quantity; quantities with an error are at the end."""
+    """Return a table row for each quantity, those with an error last."""
     begin = "equilibrium_from" if means else "from_time"
     exact = {"packing": td.packing(runs[0]), begin: start}
     momentum = np.mean([equilibrium.drift(run) * run.mass.sum() for run in runs], axis=0)
@@ -189,7 +190,7 @@ def table(
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the pressure against time and the distribution of free paths."""
+    """Plot the pressure as a function of time, and the distribution of free paths."""
     row = [Panel("pressure", draw_pressure, (result,), aspect=0.7)] * bool(result.values.means)
     row += [Panel("free_paths", draw_paths, (result,), aspect=0.7)] * bool(result.values.paths)
     eta = ", ".join(sorted({f"{td.packing(run):.4g}" for run in result.runs}))

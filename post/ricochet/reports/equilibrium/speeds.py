@@ -22,12 +22,11 @@ from ..registry import Analysis
 from ..result import Result
 from ..tables import measured
 
-BINS = np.linspace(0, 3, 51)  # u = 1 is the centre of a bin
-WIDE_BINS = np.linspace(0, 3.06, 18)  # of a histogram of at most `FEW_SPEEDS` speeds
+BINS = np.linspace(0, 3, 51)  # u = 1 is at the centre of a bin
+WIDE_BINS = np.linspace(0, 3.06, 18)  # for a histogram of up to `FEW_SPEEDS` speeds
 FEW_SPEEDS = 300
-# Panel titles, one for each possible state of the gas in the late frames (the frames after the
-# initial relaxation).  The titles `EQUILIBRIUM` and `STEADY` are used if the average of kT does not
-# change during the late frames.
+# Titles of the panel of late frames, those after the initial relaxation, by the state of the gas.
+# `EQUILIBRIUM` and `STEADY` are used if the mean kT does not change in the late frames.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"
@@ -51,7 +50,7 @@ UNSCALED = Option(
 
 
 class Pool(NamedTuple):
-    """Density of the speeds of a species in late frames, and the row of the table."""
+    """Density of the speeds of a species in late frames, and its row of the table."""
 
     density: Estimate
     row: dict[str, Any]
@@ -74,12 +73,12 @@ def state_of(run: Run) -> str:
 def temperature(
     runs: list[Run], picked: list[list[int]], species: str | None = None
 ) -> tuple[SeriesMean, list[float], bool]:
-    """Return the mean kT of the frames, kT of the first and last frame, and whether kT drifts."""
+    """Return the mean kT of the frames, kT of the first and the last, and whether kT drifts."""
     tracks = tracks_of(runs, picked, species)
     kt = combine_runs([correlated_mean(track) for track in tracks])
     alone = species is None or len(runs[0].names) == 1
     if alone and all(run.nature.keeps_kinetic_energy for run in runs):
-        kt = kt._replace(error=0.0, drift=0.0)  # however few there are
+        kt = kt._replace(error=0.0, drift=0.0)  # however few frames there are
     ends = [float(np.mean([track[k] for track in tracks])) for k in (0, -1)]
     return kt, ends, has_drift(kt) or any(map(has_trend, tracks))
 
@@ -87,7 +86,7 @@ def temperature(
 def tracks_of(
     runs: list[Run], picked: list[list[int]], species: str | None, component: int | None = None
 ) -> list[np.ndarray]:
-    """Return kT in all frames between the first and the last selected frame of each run."""
+    """Return kT in all frames from the first to the last selected one of each run."""
     spans = [slice(frames[0], frames[-1] + 1) for frames in picked]
     return [
         kt_of_frames(run, own, species, component) for run, own in zip(runs, spans, strict=True)
@@ -95,7 +94,7 @@ def tracks_of(
 
 
 def pooled(runs: list[Run], picked: list[list[int]], state: str, name: str) -> Pool:
-    """Return the speed density (B,) of a species in late frames, and statistical test results."""
+    """Return the speed density (B,) of a species in late frames, with results of the tests."""
     own, each = zip(runs, picked, strict=True), state not in (EQUILIBRIUM, STEADY)
     members = [reduced_speeds(*one, each=each, species=name) for one in own]
     members = [u.reshape(len(frames), -1) for u, frames in zip(members, picked, strict=True)]
@@ -130,7 +129,7 @@ def pooled(runs: list[Run], picked: list[list[int]], state: str, name: str) -> P
 
 
 class Scale(NamedTuple):
-    """Axis of speeds, with labels and with the thermal speed in units of the axis."""
+    """Axis of speeds: labels, and the thermal speed in units of the axis."""
 
     thermal: float = 1.0  # sqrt(2 kT / m), or 1
     label: str = "speed $u = v\\,/\\,\\sqrt{2kT/m}$"
@@ -138,14 +137,14 @@ class Scale(NamedTuple):
 
     @property
     def law(self) -> str:
-        """Return the Maxwell distribution as text for the legend of a figure."""
+        """Return the Maxwell distribution as text for a legend."""
         if self.thermal == 1.0 and "u" in self.label:
             return "Maxwell, $P(u)=2u\\,e^{-u^2}$"
         return "Maxwell, $P(v)=(mv/kT)\\,e^{-mv^2/2kT}$"
 
 
 def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:
-    """Return the axis of speeds at a temperature, for v if `unscaled` is true, otherwise for u."""
+    """Return the axis of speeds at a temperature, for v if `unscaled`, otherwise for u."""
     if not unscaled:
         return Scale()
     labels = (
@@ -163,7 +162,7 @@ def draw_histogram(
     shades: Sequence[str],
     bins: np.ndarray = BINS,
 ) -> None:
-    """Draw histograms of speeds as steps, and a Maxwell distribution for each scale of speeds."""
+    """Plot histograms of speeds as steps, with a Maxwell distribution for each scale."""
     style = {"fill": True, "alpha": 0.45} if len(heights) == 1 else {"fill": False}
     each = zip(heights, labels, scales, shades, strict=True)
     for height, label, scale, colour in each:
@@ -179,7 +178,7 @@ def draw_histogram(
 
 
 def draw_frame(axes: plt.Axes, group: Group, frame: int, title: str, unscaled: bool) -> None:
-    """Draw the distribution of the speeds in one frame."""
+    """Plot the speed distribution in one frame."""
     run = group.runs[0]
     axes.set_title(title)
     if not all_move(run, frame):
@@ -194,7 +193,7 @@ def draw_frame(axes: plt.Axes, group: Group, frame: int, title: str, unscaled: b
 
 
 def draw_late(axes: plt.Axes, result: Result) -> None:
-    """Draw the distributions of the speeds in late frames."""
+    """Plot the speed distributions in late frames."""
     pools = [pool for group in result.groups for pool in group.values]
     run = result.groups[-1].runs[0]
     scales = [scale_of(run, pool.row.get("kT", 0.0), result.options.unscaled) for pool in pools]
@@ -205,7 +204,7 @@ def draw_late(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_relaxation(axes: plt.Axes, groups: list[Group], state: str) -> None:
-    """Draw the mean of a2 over the runs, and its error, against collisions per disk."""
+    """Plot the mean of a2 over the runs, with its error, against collisions per disk."""
     equal = True
     for group in groups:
         tracks = [relaxation(run) for run in group.runs]
@@ -231,12 +230,12 @@ def draw_relaxation(axes: plt.Axes, groups: list[Group], state: str) -> None:
 
 
 def name_of(row: dict[str, Any]) -> str:
-    """Return the number of disks and the species."""
+    """Return the number of disks and the species as text."""
     return ", ".join(filter(None, (f"N = {row['N']}", row.get("species"))))
 
 
 def cooling(row: dict[str, Any]) -> str:
-    """Return the change of kT as text; kT usually falls, but can increase under gravity."""
+    """Return the change of kT as text; kT usually falls, but may rise under gravity."""
     goes = "falls" if row["kT_last"] < row["kT_first"] else "goes"
     if row["frames"] == row["runs"]:
         return f"kT is {row['kT_last']:.4g}"
@@ -244,7 +243,7 @@ def cooling(row: dict[str, Any]) -> str:
 
 
 def told(row: dict[str, Any], state: str) -> str:
-    """Return the temperature and the results of the statistical tests as text."""
+    """Return the temperature and the results of the tests as text."""
     size, free = row["speeds"], row["independent"]
     words = f"{name_of(row)}: {size} speeds" + f", {free} independent" * (free < size)
     if state in (STEADY, MOVING):
@@ -258,12 +257,12 @@ def told(row: dict[str, Any], state: str) -> str:
 
 
 def chance(p: float) -> str:
-    """Return a p-value as text, which is never "0" or "1"."""
+    """Return a p-value as text, never "0" or "1"."""
     return "p < 0.0001" if p < 1e-4 else f"p = {min(p, 0.9999):.4f}"
 
 
 def draw(result: Result) -> Sheet:
-    """Draw speeds in the first, last and late frames, and the relaxation of a2."""
+    """Plot speeds in the first, the last and the late frames, and the relaxation of a2."""
     largest, unscaled = result.groups[-1], result.options.unscaled
     first = Panel("start", draw_frame, (largest, 0, "Start", unscaled))
     last = Panel("end", draw_frame, (largest, -1, "One frame at the end", unscaled))
@@ -273,7 +272,7 @@ def draw(result: Result) -> Sheet:
 
 
 def check_unscaled(runs: list[Run], state: str) -> None:
-    """Raise an error if --unscaled is used but masses or temperatures in late frames differ."""
+    """Raise RunError if --unscaled is used although masses or late temperatures differ."""
     for run in runs:
         if np.ptp(run.mass) > 0:
             raise RunError(
@@ -285,7 +284,7 @@ def check_unscaled(runs: list[Run], state: str) -> None:
 
 
 def common_state(runs: list[Run]) -> str:
-    """Return the state of all runs, or raise an error if they differ in kind."""
+    """Return the state of the runs; raise RunError if they differ in kind."""
     state, *others = map(state_of, runs)
     for run, other in zip(runs[1:], others, strict=True):
         if other != state:
@@ -294,7 +293,7 @@ def common_state(runs: list[Run]) -> str:
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Compare the speeds in late frames of each species with Maxwell's law."""
+    """Compare the speeds of each species in late frames with the Maxwell distribution."""
     runs = [run for group in groups for run in group.runs]
     state, warnings = common_state(runs), []
     for group in groups:
@@ -318,7 +317,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     if options.unscaled:
         check_unscaled(runs, state)
     rows = [row for group in groups for _, row in group.values]
-    if len(rows) > len(groups):  # the other colours are those of the species
+    if len(rows) > len(groups):  # the first colours are those of the species
         for group, colour in zip(groups, colours(len(groups), len(rows)), strict=True):
             group.colour = colour
     several = OVER_RUNS * any(len(group.runs) > 1 for group in groups)

@@ -35,7 +35,7 @@ UNITS = {
 
 
 def table(groups: list[Group]) -> tuple[list[dict[str, Any]], list[str]]:
-    """Return a table row for each packing fraction and coefficient, and warnings."""
+    """Return a table row for each packing fraction and coefficient, and a list of warnings."""
     rows, unsettled, warnings = [], [], []
     for group in groups:
         found = group.values
@@ -56,7 +56,7 @@ def table(groups: list[Group]) -> tuple[list[dict[str, Any]], list[str]]:
 
 
 def draw_lags(axes: plt.Axes, groups: list[Group], name: str) -> None:
-    """Draw a coefficient, divided by Enskog's coefficient, against the lag."""
+    """Plot a coefficient, relative to Enskog's value, against the lag."""
     for group in groups:
         if name in group.values:
             style = {"color": group.colour, "lw": 1, "marker": ".", "ms": 3}
@@ -69,9 +69,10 @@ def draw_lags(axes: plt.Axes, groups: list[Group], name: str) -> None:
 
 
 def draw_all(axes: plt.Axes, result: Result) -> None:
-    """Draw all coefficients, divided by Enskog's coefficients, against the packing fraction."""
+    """Plot all coefficients, relative to Enskog's values, against the packing fraction."""
     packing = [group.key for group in result.groups]
-    apart = 0.015 * (max(np.ptp(packing), 0.1))  # of points that would otherwise cover each other
+    # offset of points that would otherwise cover each other
+    apart = 0.015 * (max(np.ptp(packing), 0.1))
     for k, ((name, label), marker) in enumerate(zip(LABELS.items(), "osv^", strict=True)):
         own = [row for row in result.table if row["what"] == name]
         if own:
@@ -87,8 +88,9 @@ def draw_all(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the coefficients against lag and packing fraction."""
-    scale = colours(len(result.groups), len(COLOURS))  # other colours show coefficients
+    """Plot the coefficients against lag and packing fraction."""
+    # the colours before these denote coefficients
+    scale = colours(len(result.groups), len(COLOURS))
     for group, colour in zip(result.groups, scale, strict=True):
         group.colour = colour
     there = set().union(*(group.values for group in result.groups))
@@ -100,7 +102,7 @@ def draw(result: Result) -> Sheet:
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Return the transport coefficients and their ratios to Enskog's coefficients."""
+    """Return the transport coefficients, and their ratios to Enskog's values."""
     for group in groups:
         group.values = coefficients(group.runs, options.equilibration)
     rows, warnings = table(groups)

@@ -1,4 +1,4 @@
-"""Contact network and force chains of a run, from the collisions in a window of time."""
+"""Contact network and force chains of a run, from the collisions in a time window."""
 
 import csv
 from itertools import product
@@ -21,13 +21,13 @@ from ..options import Option
 from ..registry import Analysis
 from ..result import Result
 
-WIDEST = 5.0  # width of the line of the contact at the quantile TOP [points]
+WIDEST = 5.0  # width of the line of a contact whose impulse is at the quantile TOP [points]
 TOP = 0.995
 COLUMNS = ("i", "j", "contacts", "impulse", "force")
 
 
 class Found(NamedTuple):
-    """Contacts in a window of time, which of them are in a chain, and the frame that is drawn."""
+    """Contacts in a time window, a mask of those in chains, and the frame to draw."""
 
     network: ContactNetwork
     chained: np.ndarray
@@ -37,7 +37,7 @@ class Found(NamedTuple):
 def lines_of(run: Run, frame: int, found: ContactNetwork) -> np.ndarray:
     """Return a line (E, 2, 2) for each contact, from disk i to the nearest image of disk j.
 
-    With a boundary, it leads to the edge of the disk.
+    The line of a contact with a boundary ends at the rim of the disk.
     """
     place, start = run.position[frame], found.i - 1
     to_boundary = -found.momentum / np.maximum(np.hypot(*found.momentum.T), 1e-300)[:, None]
@@ -49,7 +49,7 @@ def lines_of(run: Run, frame: int, found: ContactNetwork) -> np.ndarray:
 
 
 def draw_network(axes: plt.Axes, result: Result) -> None:
-    """Draw the disks of a frame, and a line for each contact."""
+    """Draw the disks in a frame, with a line for each contact."""
     (run,), (found, chained, frame) = result.runs, result.values
     drawing.draw_box(axes, run, run.time[frame])
     axes.set_title(f"disks at t = {run.time[frame]:.4g}")
@@ -72,7 +72,7 @@ def draw_network(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_forces(axes: plt.Axes, result: Result) -> None:
-    """Draw the distribution of the forces of two disks, in units of the mean force."""
+    """Plot the distribution of the disk-disk contact forces, in units of their mean."""
     found = result.values.network
     axes.set(xlabel="force / mean force", ylabel="probability density")
     if not found.pairs.any():
@@ -89,7 +89,7 @@ def draw_forces(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the network, and the distribution of the forces."""
+    """Draw the network, and plot the distribution of the forces."""
     (run,), row = result.runs, result.table[0]
     aspect = min(max(drawing.aspect_of(run), 0.8), 1.8)
     network = Panel("network", draw_network, (result,), aspect)

@@ -1,4 +1,4 @@
-"""Mean kinetic energy of each species of an elastic or inelastic mixture against time."""
+"""Mean kinetic energy of each species of an elastic or inelastic mixture as a function of time."""
 
 from itertools import chain, cycle
 from types import SimpleNamespace
@@ -24,13 +24,13 @@ DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # line styles
 
 
 def in_time(found: Curves, name: str) -> Estimate:
-    """Return the energy of a species as a function of time, in units of the initial mean energy."""
+    """Return the energy of a species over time, relative to the initial mean of all disks."""
     first = found["energy_all"].mean[0]
     return Estimate(*(part / first for part in found[f"energy_{name}"]))
 
 
 def draw_ratio(axes: plt.Axes, groups: list[Group]) -> None:
-    """Draw the temperature ratio against collisions per disk, with the theory for a dilute gas."""
+    """Plot the temperature ratio against collisions per disk, with the theory of a dilute gas."""
     results = [group.values for group in groups]
     for group in groups:
         if "ratio" in group.values:
@@ -51,7 +51,7 @@ def draw_ratio(axes: plt.Axes, groups: list[Group]) -> None:
 
 
 def draw_overview(axes: plt.Axes, groups: list[Group], against: str) -> None:
-    """Draw all energies on a logarithmic axis, with a colour for each restitution."""
+    """Plot all energies on a logarithmic axis, with one colour for each restitution."""
     run = groups[0].runs[0]
     for group in groups:
         for name, style in styles(run):
@@ -69,7 +69,7 @@ def draw_overview(axes: plt.Axes, groups: list[Group], against: str) -> None:
             axes.plot([], [], color="0.3", ls=style, label=name)
         axes.set_xlabel("collisions per disk")
     axes.set(yscale="log", ylabel="energy / initial mean energy")
-    low, high = axes.get_ylim()  # an elastic gas has rounding errors only
+    low, high = axes.get_ylim()  # an elastic gas has only rounding errors
     axes.set_ylim(min(low, 0.9), max(high, 1.1))
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter("{x:g}")
@@ -84,20 +84,21 @@ def styles(run: Run) -> list[tuple[str, Any]]:
 
 
 def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
-    """Return the variance of the energies in a species over the squared mean energy, at tau.
+    """Return the variance of the energies in a species over their squared mean, at tau.
 
-    Collisions change it from its initial value to 1, that of an exponential distribution.
+    Collisions change it from its initial value to 1, the value for an exponential distribution.
     """
     first = run.kinetic_energy(0)[kind.disks]
     start = float(np.var(first) / np.mean(first) ** 2) if np.any(first) else 1.0
-    return 1 - (1 - start) * np.exp(-tau)  # exp(-tau): fraction without a collision
+    # exp(-tau) is the fraction of disks that have not collided
+    return 1 - (1 - start) * np.exp(-tau)
 
 
 def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray) -> dict:
-    """Return the expected standard deviation of the mean energy in single runs, by species.
+    """Return the expected standard deviation of the mean energy of a single run, by species.
 
-    The energies of disks are taken as independent, apart from a fixed sum in an elastic gas.
-    Inelastic collisions correlate them, so that the true standard deviation is smaller.
+    The energies of the disks are taken to be independent, except for their fixed sum in an elastic
+    gas. Inelastic collisions correlate them, so that the true standard deviation is smaller.
     """
     counts = {kind.name: int(kind.disks.sum()) for kind in run.by_species}
     variances = {
@@ -113,9 +114,9 @@ def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray)
 
 
 def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
-    """Return the standard deviation of each energy over single runs as a function of time.
+    """Return the standard deviation over single runs of each energy as a function of time.
 
-    It is measured if there are at least four runs, and otherwise the expected one.
+    It is measured if there are at least four runs; otherwise it is the expected one.
     """
     names = ("all", *runs[0].names)
     if len(runs) >= FEWEST_RUNS:
@@ -129,7 +130,7 @@ def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
 def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
     """Return the half-width of the error band of the temperature ratio.
 
-    With fewer than `FEWEST_RUNS` runs it is twice the standard deviation over single runs.
+    For fewer than `FEWEST_RUNS` runs it is twice the standard deviation over single runs.
     """
     if len(runs) >= FEWEST_RUNS:
         return found["ratio"].error
@@ -141,7 +142,7 @@ def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
 
 
 def draw_energies(axes: plt.Axes, group: Group, labelled: bool) -> None:
-    """Draw the mean energies for one coefficient of restitution on linear axes."""
+    """Plot the mean energies for one coefficient of restitution on linear axes."""
     runs, found = group.runs, group.values
     names = ("all", *runs[0].names) if len(runs[0].names) > 1 else ("all",)
     labels = {kind.name: kind.label for kind in runs[0].by_species}
@@ -159,7 +160,7 @@ def draw_energies(axes: plt.Axes, group: Group, labelled: bool) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the energies for each coefficient of restitution, and the temperature ratio."""
+    """Plot the energies for each coefficient of restitution, and the temperature ratio."""
     groups = result.groups
     columns = min(len(groups), 3)
     aspect = 0.35 * columns + 0.2
@@ -186,34 +187,34 @@ def draw(result: Result) -> Sheet:
 
 
 class Key(NamedTuple):
-    """Contact law and wall rule of runs that are averaged."""
+    """Contact law and wall rule shared by runs that are averaged."""
 
     law: Restitution
-    wall_rule: str  # empty in a periodic box, and if all runs have the same
+    wall_rule: str  # empty in a periodic box, or if it is the same in all runs
 
     def __format__(self, spec: str) -> str:
         return f"ξ = {self.law:{spec}}" + f", wall rule {self.wall_rule}" * bool(self.wall_rule)
 
 
 def by_collisions(runs: list[Run]) -> list[tuple[Key, list[Run]]]:
-    """Runs with the same restitution of disks and the same wall rule are averaged."""
+    """Group runs with the same restitution of disks and the same wall rule."""
     rules = [rule_of(run) for run in runs]
     one = len({*rules}) == 1
     return grouped(runs, lambda run: Key(run.contact_law, "" if one else rule_of(run)))
 
 
 def suffix(key: Key) -> str:
-    """Return the end of the names of columns for a group."""
+    """Return the end of the column names of a group."""
     return f"_xi{key.law:g}" + f"_{key.wall_rule}" * bool(key.wall_rule)
 
 
 def rule_of(run: Run) -> str:
-    """Return the rule of the walls, which is empty in a periodic box."""
+    """Return the wall rule, empty in a periodic box."""
     return "" if run.periodic.all() else str(run.parameter("contact", "wall_rule", "velocity"))
 
 
 def table(groups: list[Group]) -> list[dict[str, Any]]:
-    """Return energy, temperature ratio and share of flows at the end, by restitution."""
+    """Return the final energy, temperature ratio and fraction of flows, by restitution."""
     several = any(group.key.wall_rule for group in groups)
     return [
         {
@@ -229,7 +230,7 @@ def table(groups: list[Group]) -> list[dict[str, Any]]:
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Return the energies of all species against time and collisions per disk."""
+    """Return the energies of all species as functions of time and collisions per disk."""
     for group in groups:
         group.values = energies(group.runs)
     species = max(len(group.runs[0].names) for group in groups) * (len(groups[0].runs[0].names) > 1)
@@ -241,7 +242,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
 
 
 def meaning_of_bands(groups: list[Group]) -> str:
-    """Return a note on the bands of the figure (see `ratio_band`)."""
+    """Return a note on the bands in the figure (see `ratio_band`)."""
     few = [len(group.runs) < FEWEST_RUNS for group in groups]
     text = "Bands in the first row"
     if any(few) and any("ratio" in group.values for group in groups):

@@ -1,4 +1,4 @@
-"""Crater of a projectile: pictures before and after the impact, energy, and crater size."""
+"""Impact of a projectile: pictures before and after the impact, energy, and crater size."""
 
 from types import SimpleNamespace
 
@@ -16,11 +16,11 @@ from ..groups import Group, each_run
 from ..registry import Analysis
 from ..result import Result
 
-BELOW = {"location": "bottom", "pad": 0.02, "shrink": 0.9, "aspect": 30}  # place of a colour bar
+BELOW = {"location": "bottom", "pad": 0.02, "shrink": 0.9, "aspect": 30}  # position of a colour bar
 
 
 def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits: tuple):
-    """Draw the bed disks with colours that show the given values, and the projectile in black."""
+    """Draw the bed disks, coloured by the given values, and the projectile in black."""
     draw_box(axes, run, run.time[frame])
     colours = plt.get_cmap("viridis")(plt.Normalize(*limits)(values))
     colours[projectile(run)] = (0, 0, 0, 1)
@@ -33,19 +33,20 @@ def hull(run: Run) -> np.ndarray:
     points = run.position[0][displaced(run)]
     if len(points) < 4:
         return points[:0]
-    vertices = scipy.spatial.ConvexHull(points, qhull_options="QJ").vertices  # QJ: also for a row
+    # QJ allows points in a row
+    vertices = scipy.spatial.ConvexHull(points, qhull_options="QJ").vertices
     return points[np.append(vertices, vertices[0])]
 
 
 def draw_outline(axes: plt.Axes, ring: np.ndarray, colour: str, label: str) -> None:
-    """Draw the outline of a region, unless the outline is empty."""
+    """Draw the outline of a region, unless it is empty."""
     if len(ring):
         axes.plot(*ring.T, color=colour, lw=1.4, zorder=4, label=label)
         legend_above(axes)
 
 
 def draw_displacements(axes: plt.Axes, run: Run, frame: int) -> None:
-    """Draw the bed before or after the impact, with the displacements of the disks."""
+    """Draw the bed before or after the impact, coloured by the displacements of the disks."""
     limits = (0, drawing.scale_top(run, [run.n_frames - 1], "displacement"))
     draw_state(axes, run, frame, run.displacement(-1), limits)
     if frame == 0:
@@ -58,7 +59,7 @@ def draw_displacements(axes: plt.Axes, run: Run, frame: int) -> None:
 
 
 def draw_hits(axes: plt.Axes, run: Run) -> None:
-    """Draw the number of collisions of each disk at its first position."""
+    """Draw each disk at its initial position, coloured by its number of collisions."""
     count = np.log10(1.0 + run.event_count[-1])
     top = float(np.ceil(count[bed(run)].max())) or 1.0
     draw_state(axes, run, 0, count, (0, top))
@@ -70,7 +71,7 @@ def draw_hits(axes: plt.Axes, run: Run) -> None:
 
 
 def draw_energy(axes: plt.Axes, run: Run) -> None:
-    """Draw the remaining energy and the number of collisions against time."""
+    """Plot the remaining energy and the number of collisions as functions of time."""
     time, energy = run.observable("all/kinetic_energy")
     axes.semilogy(time, energy / energy[0], color=COLOURS[0], label="kinetic energy $E/E_0$")
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -114,7 +115,7 @@ def sizes_of(run: Run, size: Crater) -> list[str]:
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Return the size of the crater of each run."""
+    """Return the size of the crater in each run."""
     rows, warnings = [], []
     for group in groups:
         (run,), name = group.runs, group.runs[0].path.name

@@ -35,7 +35,7 @@ from ..registry import Analysis
 from ..result import Result
 from ..tables import measured
 
-#: Text and unit of the axis label of each parameter.
+#: Axis label of each parameter: text and quantity.
 AXES = {
     "mass": ("mass of the projectile / mass of a bed disk, $M$", "number"),
     "speed": ("speed of the projectile $v$", "speed"),
@@ -49,16 +49,16 @@ EXTENTS |= {"hole_width": "width of the hole", "hole_depth": "depth of the hole"
 ALL = SIZES | EXTENTS
 MARKERS = "osDv"
 NONE = Estimate(np.nan, np.nan)  # exponent of a curve without a fit
-ROUNDING = 1e-9  # an exponent below this value is 0
-FEWEST_POINTS = 3  # smallest number of points that is fitted
+ROUNDING = 1e-9  # absolute value below which an exponent counts as 0
+FEWEST_POINTS = 3  # fewest points to which a power law is fitted
 
 
 class Point(NamedTuple):
-    """The craters of all runs that differ only by their seed."""
+    """Craters of all runs that differ only in their seed."""
 
-    values: dict[str, float]  # of AXES
+    values: dict[str, float]  # of the parameters in AXES
     seeds: tuple[int, ...]  # of the R runs
-    of_runs: dict[str, np.ndarray]  # (R,) sizes in each run
+    of_runs: dict[str, np.ndarray]  # (R,) sizes in the runs
     sizes: dict[str, Estimate]  # means over the runs
     energy_left: Estimate
     side_collisions: Estimate  # per run
@@ -67,11 +67,12 @@ class Point(NamedTuple):
 
     @property
     def runs(self) -> int:
-        """The number of runs."""
+        """Number of runs."""
         return len(self.seeds)
 
 
-Scans = dict[str, list[list[Point]]]  # the curves of each parameter; points in ascending order
+# the curves of each parameter, with points in increasing order
+Scans = dict[str, list[list[Point]]]
 
 
 def key_of(run: Run) -> tuple[float, ...]:
@@ -101,19 +102,19 @@ def point(key: tuple[float, ...], runs: list[Run]) -> Point:
 
 
 def curves_of(scans: Scans) -> Iterator[tuple[str, list[Point]]]:
-    """Yield the name of the parameter and the points of each curve."""
+    """Yield each curve, with the name of its parameter."""
     for axis, scan in scans.items():
         for curve in scan:
             yield axis, curve
 
 
 def others(axis: str, curve: list[Point]) -> dict[str, float]:
-    """Return the three parameters that are equal for all points of a curve."""
+    """Return the three parameters that are constant along a curve."""
     return {name: value for name, value in curve[0].values.items() if name != axis}
 
 
 def scanned(points: list[Point]) -> Scans:
-    """Return the curves with at least two points, or the longest curve if all have one point."""
+    """Return the curves with at least two points or, if there are none, the longest curve."""
     scans = {}
     for axis in AXES:
         families = grouped(points, lambda p, axis=axis: tuple(others(axis, [p]).values()))
@@ -124,7 +125,7 @@ def scanned(points: list[Point]) -> Scans:
 
 
 def unused(points: list[Point], scans: Scans) -> list[str]:
-    """Return the points that do not belong to any curve."""
+    """Return a note on the points that belong to no curve."""
     drawn = [p.values for _, curve in curves_of(scans) for p in curve]
     return [
         f"not drawn: {listed(p.values)} (runs: {p.runs}), from which no other run differs in one "
@@ -135,12 +136,12 @@ def unused(points: list[Point], scans: Scans) -> list[str]:
 
 
 def fitted_values(curve: list[Point], axis: str) -> int:
-    """Return the number of different parameter values among the points used in the fit."""
+    """Return the number of different parameter values among the fitted points."""
     return len({p.values[axis] for p in curve if p.free})
 
 
 def unfitted(scans: Scans, runs: list[Run]) -> list[str]:
-    """Return the reason why curves cannot be fitted, and a bed size that would allow a fit."""
+    """Return why curves cannot be fitted, and the size of a bed that would allow a fit."""
     notes, fraction = [], energy_fraction(runs[0])
     for axis, curve in curves_of(scans):
         cut = [p for p in curve if not p.free]
@@ -167,15 +168,15 @@ def listed(values: dict[str, float]) -> str:
 
 
 def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
-    """Return the variable x of the fit, calculated from the values of a parameter."""
+    """Return the variable x of the fit, given the values of a parameter."""
     return 1 - np.square(x) if axis == "restitution" else np.asarray(x, dtype=float)
 
 
 def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
     """Fit a power law to a crater size.
 
-    If all points are means over the same beds, their sizes are correlated, and the error of the
-    exponent is that of the jackknife over beds.
+    If all points are means over the same beds, their sizes are correlated. The error of the
+    exponent is then estimated by the jackknife over beds.
     """
     free = [p for p in curve if p.free]
     x = abscissa(axis, [p.values[axis] for p in free])
@@ -193,7 +194,7 @@ def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
 
 
 def power(axis: str, fit: PowerLaw | None) -> str:
-    """Return the fitted power law as text for the legend of a figure."""
+    """Return the fitted power law as text for a legend."""
     if not fit:
         return ""
     exact = max(abs(fit.exponent), fit.exponent_error) < ROUNDING
@@ -206,7 +207,7 @@ def power(axis: str, fit: PowerLaw | None) -> str:
 def draw_size(
     axes: plt.Axes, axis: str, curve: list[Point], name: str, fit: PowerLaw | None, **style: Any
 ) -> None:
-    """Draw one crater size against a parameter, with the fitted power law in its range."""
+    """Plot one crater size against a parameter, with the fitted power law in its range."""
     values, y, error = np.array([(p.values[axis], *p.sizes[name]) for p in curve]).T
     x, error = abscissa(axis, values), np.nan_to_num(error)
     free = np.array([p.free for p in curve])
@@ -216,7 +217,7 @@ def draw_size(
     else:
         axes.plot(x, y, color=style["color"], lw=0.8, alpha=0.4)
     open_style = style | {"mfc": "white"}
-    if free.any():  # the legend shows the symbol that most points have
+    if free.any():  # the legend shows the symbol of most points
         axes.errorbar(x[free], y[free], error[free], ls="", **style)
         open_style["label"] = ""
     axes.errorbar(x[~free], y[~free], error[~free], ls="", **open_style)
@@ -225,7 +226,7 @@ def draw_size(
 def draw_sizes(
     axes: plt.Axes, result: Result, axis: str, names: dict[str, str], own: Sequence[str]
 ) -> None:
-    """Draw several crater sizes against a parameter.
+    """Plot several crater sizes against a parameter.
 
     Colours distinguish the curves or, if there is only one, the sizes.
     """
@@ -257,7 +258,7 @@ def draw_sizes(
 
 
 def shapes(axes: plt.Axes, x: np.ndarray) -> None:
-    """Make both axes logarithmic, with the values of the points as ticks, if all are positive."""
+    """If all values are positive, make both axes logarithmic with ticks at the points."""
     heights = [line.get_ydata() for line in axes.lines if len(line.get_ydata())]
     if min(x) > 0 and min(map(np.min, heights)) > 0:
         axes.set(xscale="log", yscale="log")
@@ -274,7 +275,7 @@ def shapes(axes: plt.Axes, x: np.ndarray) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw two panels for each parameter: numbers of disks, and width and depth."""
+    """Plot two panels for each parameter: numbers of disks, and width and depth."""
     rows = []
     for axis in result.values:
         numbers = Panel(f"{axis}_numbers", draw_sizes, (result, axis, SIZES, COLOURS[:2]), 0.85)
@@ -328,12 +329,12 @@ def tables(scans: Scans) -> Tables:
 
 
 def by_parameters(runs: list[Run]) -> list[tuple[tuple[float, ...], list[Run]]]:
-    """Runs that differ only by their seed are combined."""
+    """Group runs that differ only in their seed."""
     return grouped(runs, key_of)
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Return the mean sizes of craters, and power laws that are fitted to them."""
+    """Return the mean sizes of craters, and power laws fitted to them."""
     points = [point(group.key, group.runs) for group in groups]
     scans, runs = scanned(points), [run for group in groups for run in group.runs]
     found = tables(scans)

@@ -27,13 +27,13 @@ from ..registry import Analysis
 from ..result import Result
 from ..tables import Table, measured
 
-EXPONENT = 1.5  # of Beverloo's law in two dimensions
+EXPONENT = 1.5  # exponent of Beverloo's law in two dimensions
 BEVERLOO = 1.4  # k of Beverloo, Leniger and van de Velde (1961)
-WINDOWS = 50  # number of mean rates in a figure against time
+WINDOWS = 50  # number of mean rates in a figure over time
 
 
 def mouth(run: Run) -> float:
-    """Return the shortest distance between an end of a wall and an end of another wall."""
+    """Return the shortest distance between the ends of two different walls."""
     ends = run.walls
     gaps = [
         np.linalg.norm(one - other)
@@ -48,12 +48,12 @@ def mouth(run: Run) -> float:
 
 
 def reduced_width(run: Run) -> float:
-    """Return the width of the mouth divided by the mean diameter of the disks."""
+    """Return the width of the mouth in mean disk diameters."""
     return round(mouth(run) / (2 * float(run.radius.mean())), 6)
 
 
 def rate(run: Run, after: float):
-    """Return the mean number of recycled disks per time after the time `after`."""
+    """Return the mean number of disks recycled per time after the time `after`."""
     time, rates = rates_of(run)
     late = time[:-1] >= after
     if late.sum() < 2:
@@ -63,12 +63,12 @@ def rate(run: Run, after: float):
 
 
 def reduction(run: Run) -> float:
-    """Return the factor sqrt(d / g), by which a rate is multiplied to make it dimensionless."""
+    """Return sqrt(d / g), which makes a rate dimensionless when multiplied by it."""
     return float(np.sqrt(2 * run.radius.mean() / np.linalg.norm(run.gravity)))
 
 
 def rates_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sampling times (T,), and the numbers of recycled disks per time between them."""
+    """Return the sampling times (T,), and the disks recycled per time between them."""
     if "recycled" not in run.nature:
         raise Refused(f"{run.path}: recycles no disks (drive.kind = 'recycle')")
     if not np.any(run.gravity):
@@ -78,7 +78,7 @@ def rates_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 
 def draws_radii(run: Run) -> bool:
-    """Return whether the program drew the radii of disks at random, as with polydispersity."""
+    """Return whether the program drew the radii at random, as with polydispersity."""
     species = run.parameters.get("species", {})
     return any(float(species.get(name, {}).get("polydispersity", 0.0)) > 0 for name in run.names)
 
@@ -88,7 +88,8 @@ def fitted(
 ) -> dict[str, Estimate]:
     """Return C and k of the first fit and the exponent of the second fit, with their errors.
 
-    `error` (M,) are those of the reduced rates `y`, each estimated from `runs` values [scatter].
+    `error` (M,) are the errors of the reduced rates `y`, each estimated from `runs` values
+    [scatter].
     """
     largest = x.min() - 1e-6
 
@@ -106,9 +107,9 @@ def fitted(
 
 
 def mean_rate(runs: list[Run], members: list[SeriesMean]) -> SeriesMean:
-    """Return the mean rate of runs with one mouth.
+    """Return the mean rate of runs with the same mouth.
 
-    If the radii are random, the error is that of the scatter of the runs.
+    If the radii are random, the error is estimated from the scatter of the runs.
     """
     if len(runs) < 2 or not any(map(draws_radii, runs)):
         return combine_runs(members)
@@ -118,16 +119,16 @@ def mean_rate(runs: list[Run], members: list[SeriesMean]) -> SeriesMean:
 
 
 class Rates(NamedTuple):
-    """Rates against the width of the mouth."""
+    """Rates for different widths of the mouth."""
 
     rows: list[dict]  # a table row for each of the M widths
     warnings: list[str]
-    independent: np.ndarray  # (M,) number of independent values from which the error follows
-    complete: bool  # whether the errors contain the scatter between samples of radii
+    independent: np.ndarray  # (M,) number of independent values behind each error
+    complete: bool  # whether the errors include the scatter over samples of radii
 
 
 def by_mouth(runs: list[Run]) -> list[tuple[float, list[Run]]]:
-    """Runs with the same width of the mouth are combined."""
+    """Group runs with the same width of the mouth."""
     return grouped(runs, lambda run: round(mouth(run), 9))
 
 
@@ -154,9 +155,9 @@ def measured_rates(runs: list[Run], after: float) -> Rates:
 
 
 def fit_of(found: Rates) -> dict[str, Estimate]:
-    """Fit Beverloo's law to measured rates; return an empty dictionary for fewer than 3 widths.
+    """Fit Beverloo's law to measured rates; return {} for fewer than three widths.
 
-    If errors of rates are unknown, those of the fit follow from the scatter of the points.
+    If the errors of the rates are unknown, the scatter of the points determines those of the fit.
     """
     x, y, error = points(found.rows)
     if found.complete and np.all(error > 0):
@@ -165,7 +166,7 @@ def fit_of(found: Rates) -> dict[str, Estimate]:
 
 
 def points(rows: list[dict]) -> np.ndarray:
-    """Return an array (3, M) with D / d, the reduced rate and its error (NaN if unknown)."""
+    """Return D / d, the reduced rate and its error (NaN if unknown) as an array (3, M)."""
     names = "D_over_d", "W_reduced", "W_reduced_error"
     return np.array([[row[name] for row in rows] for name in names], float)
 
@@ -174,7 +175,7 @@ def points(rows: list[dict]) -> np.ndarray:
 
 
 def draw_in_time(axes: plt.Axes, result: Result, name: str) -> None:
-    """Draw the number of recycled disks, or the discharge rate, of each run against time."""
+    """Plot the number of recycled disks, or the discharge rate, of each run over time."""
     runs, row, after = result.runs, result.table[0], result.options.after
     for k, run in enumerate(runs):
         style = {"color": COLOURS[0], "lw": 1, "alpha": 1 if len(runs) == 1 else 0.6}
@@ -202,7 +203,7 @@ def draw_in_time(axes: plt.Axes, result: Result, name: str) -> None:
 
 
 def draw_rates(axes: plt.Axes, result: Result) -> None:
-    """Draw the rates against D / d with Beverloo's law."""
+    """Plot the rates against D / d with Beverloo's law."""
     (x, y, error), fit = points(result.table), result.values
     axes.errorbar(x, y, error, fmt="o", color=COLOURS[0], label="measured")
     if fit:
@@ -217,7 +218,7 @@ def draw_rates(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_power(axes: plt.Axes, result: Result) -> None:
-    """Draw the rates against D / d - k on logarithmic axes, for both fits."""
+    """Plot the rates against D / d - k on logarithmic axes, with both fits."""
     x, y, error = points(result.table)
     (c, _), (k, _), (n, dn) = result.values.values()
     for shift, colour, marker in ((k, COLOURS[0], "o"), (BEVERLOO, COLOURS[1], "s")):
@@ -225,7 +226,7 @@ def draw_power(axes: plt.Axes, result: Result) -> None:
     line = np.array([(x - k).min(), (x - k).max()])
     axes.plot(line, c * line**EXPONENT, color=COLOURS[0], label="exponent 3/2")
     line = np.array([(x - BEVERLOO).min(), (x - BEVERLOO).max()])
-    scale = np.exp(np.mean(np.log(y) - n * np.log(x - BEVERLOO)))  # the line of the fit
+    scale = np.exp(np.mean(np.log(y) - n * np.log(x - BEVERLOO)))  # scale of the fitted line
     label = f"exponent {n:.2f} ± {dn:.2f}"
     axes.plot(line, scale * line**n, color=COLOURS[1], ls="--", label=label)
     axes.set(xlabel="$D/d - k$", ylabel="$W \\sqrt{d/g}$", xscale="log", yscale="log")
@@ -237,7 +238,7 @@ def draw_power(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the rates with the fits, or the rate of a single width against time."""
+    """Plot the rates with the fits, or the rate over time if there is only one width."""
     if len(result.table) == 1:
         panels = [Panel(one, draw_in_time, (result, one)) for one in ("count", "rate")]
         title = f"{caption(result.runs)},  $D/d$ = {result.table[0]['D_over_d']:.3g}"

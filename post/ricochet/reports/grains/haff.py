@@ -21,7 +21,7 @@ RATIO_TOP = 2.0  # largest upper limit of the axis of ratios
 
 
 class Cooling(NamedTuple):
-    """Curves, cooling rate or exponent, and the end of the homogeneous state."""
+    """Curves, cooling rate or exponent, and end of the homogeneous state."""
 
     curves: Curves
     rate: Estimate
@@ -39,7 +39,7 @@ class Cooling(NamedTuple):
 
 
 def draw_curves(axes: plt.Axes, result: Result, against: str, ratios: bool) -> None:
-    """Draw K, or its ratio to a law, against time ('time') or collisions per disk ('tau')."""
+    """Plot K, or its ratio to a law, against time ('time') or collisions per disk ('tau')."""
     for group in result.groups:
         x, energy, law, after = group.values.shown(against)
         mean, error = Estimate(energy.mean / law, energy.error / law) if ratios else energy
@@ -53,7 +53,7 @@ def draw_curves(axes: plt.Axes, result: Result, against: str, ratios: bool) -> N
 
 
 def draw_time(axes: plt.Axes, result: Result) -> None:
-    """Draw K against time, with Haff's law."""
+    """Plot K against time, with Haff's law."""
     draw_curves(axes, result, "time", ratios=False)
     for group in result.groups:
         axes.plot([], [], color=group.colour, label=f"ξ = {group.key:g}")
@@ -64,7 +64,7 @@ def draw_time(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_collisions(axes: plt.Axes, result: Result) -> None:
-    """Draw K against collisions per disk, with an exponential law."""
+    """Plot K against collisions per disk, with an exponential law."""
     draw_curves(axes, result, "tau", ratios=False)
     for group in result.groups:
         name, known = expected(group.key, group.values.curves)
@@ -78,7 +78,7 @@ def draw_collisions(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_ratio(axes: plt.Axes, result: Result, against: str) -> None:
-    """Draw the ratio of K to a law."""
+    """Plot the ratio of K to a law."""
     draw_curves(axes, result, against, ratios=True)
     axes.autoscale(axis="y")  # to the curves of both panels that share this axis
     axes.set(ylabel="$K$ / law", ylim=(None, min(RATIO_TOP, axes.get_ylim()[1])))
@@ -92,7 +92,7 @@ def law_of(result: Result, constant: str) -> str:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw K against time and collisions per disk, and the ratios of K to both laws below."""
+    """Plot K against time and collisions per disk, with its ratios to both laws below."""
     time = Panel("time", draw_time, (result,), aspect=0.85)
     tau = Panel("collisions", draw_collisions, (result,), aspect=0.85, share_y="time")
     low = Panel("time_ratio", draw_ratio, (result, "time"), aspect=0.45, share_x="time")
@@ -104,7 +104,7 @@ def draw(result: Result) -> Sheet:
 
 
 def energies(groups: list[Group]) -> list[dict[str, Any]]:
-    """Return the energies after 5, 10 and 20 collisions per disk, if the runs are long enough."""
+    """Return the energies after 5, 10 and 20 collisions per disk, as far as the runs reach."""
     rows = []
     for group in groups:
         found = group.values.curves
@@ -121,7 +121,7 @@ def energies(groups: list[Group]) -> list[dict[str, Any]]:
 
 
 def expected(law: Restitution, found: Curves) -> tuple[str, float]:
-    """Return the predicted cooling rate, or the predicted exponent for viscoelastic disks."""
+    """Return the predicted cooling rate or, for viscoelastic disks, the predicted exponent."""
     if law.law == "constant":
         return "rate", haff_rate(law.xi)
     return "exponent", exponent(found["w0_t"], found["haff"])
@@ -140,7 +140,7 @@ def rates(groups: list[Group]) -> list[dict[str, Any]]:
 
 
 def apart(xi: Restitution, found: Curves, end: float) -> list[str]:
-    """Return a warning if the gas stays homogeneous but the final K differs from the law."""
+    """Return a warning if the gas stays homogeneous but its final K deviates from the law."""
     ratio, tau = found["K"].mean[-1] / found["law"][-1], found["collisions_per_disk"][-1]
     if not np.isnan(end) or abs(ratio - 1) < 1 - SLOW:
         return []
@@ -149,7 +149,7 @@ def apart(xi: Restitution, found: Curves, end: float) -> list[str]:
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Compare the energy and the cooling rate with Haff's law."""
+    """Compare energy and cooling rate with Haff's law."""
     for group in groups:
         curves = [energy_left(run) for run in group.runs]
         group.values = Cooling(*haff(curves, group.key.xi, soft_law(group.runs)))

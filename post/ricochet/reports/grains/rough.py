@@ -1,4 +1,4 @@
-"""Cooling of rough disks: translational and rotational temperature against theory."""
+"""Cooling of rough disks: translational and rotational temperature, compared with theory."""
 
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -17,11 +17,11 @@ DASHED: dict[str, Any] = {"color": "black", "ls": "--", "lw": 1}
 
 
 class Rough(NamedTuple):
-    """Curves of rough disks, and two predictions."""
+    """Curves of rough disks with two predictions."""
 
     curves: Curves
-    law: tuple[float, float, float]  # restitution, tangential restitution, reduced inertia
-    boltzmann: float | None  # ratio of the temperatures from the Boltzmann equation
+    law: tuple[float, float, float]  # normal and tangential restitution, reduced inertia
+    boltzmann: float | None  # temperature ratio from the Boltzmann equation
 
     def expected(self) -> tuple[Any, Any]:
         """Return the predicted temperatures."""
@@ -30,7 +30,7 @@ class Rough(NamedTuple):
 
 
 def draw_temperatures(axes: plt.Axes, result: Result) -> None:
-    """Draw translational and rotational temperature on a logarithmic axis."""
+    """Plot the translational and the rotational temperature on a logarithmic axis."""
     found, expected = result.values.curves, result.values.expected()
     tau = found["collisions_per_disk"]
     for k, (name, label) in enumerate((("T", "$T$"), ("T_rot", "$T_{rot}$"))):
@@ -45,7 +45,7 @@ def draw_temperatures(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_ratio(axes: plt.Axes, result: Result) -> None:
-    """Draw the ratio of both temperatures."""
+    """Plot the ratio of the two temperatures."""
     found, (t, t_rot) = result.values.curves, result.values.expected()
     tau, exact = found["collisions_per_disk"], result.values.boltzmann
     band(axes, tau, *found["ratio"], color=COLOURS[2], label="measured")
@@ -57,7 +57,7 @@ def draw_ratio(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the temperatures and their ratio."""
+    """Plot the temperatures and their ratio."""
     left = Panel("temperatures", draw_temperatures, (result,))
     title = f"{caption(result.runs)},  β = {result.values.law[1]:g}"
     return Sheet([[left, Panel("ratio", draw_ratio, (result,))]], title)

@@ -44,7 +44,7 @@ def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
 
 
 def draw_cost(axes: plt.Axes, result: Result) -> None:
-    """Draw times and fits on logarithmic axes; fitted lines are dotted outside the fit range."""
+    """Plot times and fits on logarithmic axes, with fitted lines dotted outside the fit range."""
     (measured, laws), (low, high) = result.values, result.options.fit
     for search, colour, marker in zip(LABELS, COLOURS, "osD", strict=False):
         if search in measured:
@@ -64,12 +64,12 @@ def draw_cost(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the times per collision."""
+    """Plot the times per collision."""
     return Sheet([[Panel("cost", draw_cost, (result,), aspect=0.75)]])
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Return the shortest times per collision, and power laws that are fitted to them."""
+    """Return the shortest times per collision, and power laws fitted to them."""
     measured = costs(groups[0].runs)
     laws = fits(measured, *options.fit)
     table = [

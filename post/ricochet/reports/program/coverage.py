@@ -1,4 +1,4 @@
-"""Fraction of error bars that contain the true value (coverage of the error bars)."""
+"""Coverage of the error bars: fraction of error bars that contain the true value."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -20,13 +20,13 @@ SHOWN = 60  # runs in a panel
 
 
 def naive_error(run: Run, skip: float | None) -> float:
-    """Return the standard error of Z if all samples of the virial are assumed to be independent."""
+    """Return the standard error of Z assuming that all samples of the virial are independent."""
     amount, per = virial_over_kt(run, skip)
     return float(scipy.stats.sem(amount - per * np.sum(amount) / np.sum(per)) / np.mean(per))
 
 
 def draw_bars(axes: plt.Axes, group: Group, row: dict[str, Any]) -> None:
-    """Draw the means of single runs with their error bars."""
+    """Plot the means of single runs with their error bars."""
     z, error = group.values
     first = np.argsort(z[:SHOWN])
     for k, (mean, reach) in enumerate(zip(z[first], error[first], strict=True)):
@@ -39,7 +39,7 @@ def draw_bars(axes: plt.Axes, group: Group, row: dict[str, Any]) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw a panel for each packing fraction."""
+    """Plot a panel for each packing fraction."""
     panels = [
         Panel(f"packing{k + 1}", draw_bars, (group, row), aspect=1.0)
         for k, (group, row) in enumerate(zip(result.groups, result.table, strict=True))
@@ -48,12 +48,12 @@ def draw(result: Result) -> Sheet:
 
 
 def check(run: Run) -> None:
-    """Raise an error unless the equation of state is defined for a run."""
+    """Raise Refused unless an equation of state applies to a run."""
     allow(run, "the equation of state is not defined for it", *FLUID)
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Return the coverage of error bars, and that of naive error bars."""
+    """Return the coverage of the error bars, and of naive error bars."""
     rows = []
     for group in groups:
         runs = group.runs

@@ -1,4 +1,4 @@
-"""Speedup of a run that uses several processor cores."""
+"""Speedup of runs on several processor cores."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +15,7 @@ from ..result import Result
 
 
 def table(runs: list[Run]) -> list[dict[str, Any]]:
-    """Return a table row for each number of disks and number of threads, in ascending order."""
+    """Return a table row for each number of disks and of threads, in increasing order."""
     groups = grouped(runs, lambda run: (run.n_disks, int(run.provenance.get("threads", 1))))
     walls = {key: [recorded(run, "wall_time") for run in same] for key, same in groups}
     rows = []
@@ -30,7 +30,7 @@ def table(runs: list[Run]) -> list[dict[str, Any]]:
 
 
 def draw_speedup(axes: plt.Axes, result: Result) -> None:
-    """Draw the speedup against the number of threads, with the ideal speedup as a dotted line."""
+    """Plot the speedup against the number of threads, with the ideal speedup dotted."""
     rows = result.table
     for (disks, own), colour in zip(grouped(rows, lambda row: row["disks"]), COLOURS, strict=False):
         threads, y, low, high = (
@@ -50,7 +50,7 @@ def draw_speedup(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the speedup."""
+    """Plot the speedup."""
     return Sheet([[Panel("speedup", draw_speedup, (result,), aspect=0.7)]])
 
 

@@ -1,1 +1,1 @@
-"""Paths of few disks: scattering, chaos and diffusion of a tracer."""
+"""Trajectories of few disks: scattering, chaos and diffusion of a tracer."""

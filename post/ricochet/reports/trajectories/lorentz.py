@@ -18,7 +18,7 @@ from ..tables import measured
 
 
 def expansion(density: np.ndarray | float, squared: bool = True) -> np.ndarray:
-    """Return D / D_0 from the expansion in the density, with or without its last term."""
+    """Return D / D_0 from the density expansion, with or without its last term."""
     n = np.asarray(density, dtype=float)
     logarithm = n * np.log(n)
     return 1 / (1 - 4 / 3 * logarithm - 0.8775 * n + squared * 4.519 * logarithm**2)
@@ -36,7 +36,7 @@ def density_of(run: Run) -> float:
 
 
 def diffusion(run: Run, lags: tuple[float, float]) -> dict[str, float]:
-    """Return D / D_0, measured between two lags, and the mean free time divided by 1/(2 n R v)."""
+    """Return D / D_0 measured between two lags, and the mean free time over 1/(2 n R v)."""
     speed = float(run.speed(0)[0])
     reach = float(run.radius[0] + run.obstacles[0].radius)
     free = reach / (2 * density_of(run) * speed)
@@ -55,12 +55,12 @@ def diffusion(run: Run, lags: tuple[float, float]) -> dict[str, float]:
 
 
 def by_density(runs: list[Run]) -> list[tuple[float, list[Run]]]:
-    """Runs with the same reduced density are combined."""
+    """Group runs with the same reduced density."""
     return grouped(runs, density_of)
 
 
 def draw_diffusion(axes: plt.Axes, result: Result) -> None:
-    """Draw D / D_0 against the density, with the Boltzmann limit and the density expansion."""
+    """Plot D / D_0 against the density, with the Boltzmann limit and the density expansion."""
     n, ratio, error = (
         np.array([row[name] for row in result.table], dtype=float)
         for name in ("density", "diffusion", "diffusion_error")
@@ -77,7 +77,7 @@ def draw_diffusion(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the diffusion coefficient."""
+    """Plot the diffusion coefficient."""
     return Sheet([[Panel("diffusion", draw_diffusion, (result,), aspect=0.6)]])
 
 
@@ -97,5 +97,6 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
 
 MEANING = "two lags between which D is measured, in mean free times [10 30]"
 LAGS = Option("lags", MEANING, (10.0, 30.0), float, ("FROM", "TO"), number=2)
-PLACES = ("obstacle", "obstacle_rows", "position", "velocity")  # random, as with a seed
+# random, as if they depended on the seed
+PLACES = ("obstacle", "obstacle_rows", "position", "velocity")
 ANALYSIS = Analysis(compute, draw, options=(LAGS,), group_by=by_density, may_differ=PLACES)

@@ -1,4 +1,4 @@
-"""Divergence of initially close trajectories, and the Lyapunov exponent."""
+"""Divergence of trajectories that start close together, and the Lyapunov exponent."""
 
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -24,8 +24,8 @@ class Divergence(NamedTuple):
 
     time: np.ndarray  # (T,)
     logarithm: np.ndarray  # (P, T)
-    ends: tuple[float, float]  # logarithms of the smaller and of the larger distance
-    growth: np.ndarray  # (P,) growth of the logarithm between the distances
+    ends: tuple[float, float]  # logarithms of the smaller and the larger distance
+    growth: np.ndarray  # (P,) growth of the logarithm between these distances
     passed: np.ndarray  # (2, P) times at which this growth begins and ends
     reached: int  # number of pairs that reach the larger distance
     exponent: Estimate  # Lyapunov exponent [1/time]
@@ -43,7 +43,7 @@ def distance(one: Run, other: Run) -> np.ndarray:
 def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float) -> Divergence:
     """Determine the Lyapunov exponent from the distances (P, T) of P pairs of runs at T times.
 
-    The growth up to the distance `largest` is used, without its first fraction `begin` on a
+    Only the growth up to the distance `largest` counts, without its first fraction `begin` on a
     logarithmic scale.
     """
     with np.errstate(divide="ignore"):
@@ -87,7 +87,7 @@ def passage(time: np.ndarray, logarithm: np.ndarray, level: float) -> float:
 
 
 def draw_distances(axes: plt.Axes, result: Result) -> None:
-    """Draw the distance of each pair (thin), their mean (thick), and the mean growth (dashed)."""
+    """Plot the distance of each pair (thin), their mean (thick), and the mean growth (dashed)."""
     found, units = result.values, result.runs[0].units
     for track in found.logarithm:
         axes.semilogy(found.time, np.exp(track), color=COLOURS[0], lw=0.6, alpha=0.4)
@@ -104,12 +104,12 @@ def draw_distances(axes: plt.Axes, result: Result) -> None:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the distances of all pairs."""
+    """Plot the distances of all pairs."""
     return Sheet([[Panel("distances", draw_distances, (result,), aspect=0.65)]])
 
 
 def check(run: Run) -> None:
-    """Raise an error if the rate of divergence of a run is not constant."""
+    """Raise Refused if the rate of divergence in a run is not constant."""
     fading = {"changed", "collapsed", *({"inelastic"} if run.nature.cooling else ())}
     allow(run, "its rate of divergence is not constant", *TRAITS.keys() - fading)
 
