@@ -1,8 +1,8 @@
 // ---------- settings that the user can change ----------
 
 const state = { playing: false, colour: '', traced: [], arrows: false, sofar: null, total: false, momenta: true, centred: false };
-let pace;          // time of the film per second of real time, at speed 1
-let usual = true;  // whether the pace follows from the length and the speeds of this film
+let pace; // time of the film per second of real time, at speed 1
+let usual = true; // whether the pace is determined by the length and the speeds of this film
 
 function begin() {
   lookAtAll();
@@ -15,8 +15,7 @@ function begin() {
   prepareFilm();
 }
 
-// The pace is limited by two conditions: the film lasts at least 15 seconds, and a disk of typical speed crosses at most half of
-// the box per second.
+// At this pace the film lasts at least 15 seconds, and a disk of typical speed crosses at most half of the box per second.
 function usualPace() {
   const most = Math.min((last() - first()) / 15 || Infinity, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1;
   const power = 10 ** Math.floor(Math.log10(most));
@@ -37,13 +36,13 @@ function prepareFilm() {
 
 // ---------- drawing ----------
 
-let told = 0;  // when texts and plots were last drawn
+let told = 0; // time at which texts and plots were last drawn
 
 function show(time, anew = false) {
   move(time);
   deselectAbsent();
   drawStage();
-  if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return;  // texts and plots are updated less often than the disks
+  if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return; // less often than the disks
   told = performance.now();
   if (source.grows) drawEnergies();
   $('cursor').style.transform = `translateX(${Math.min(cursorAt(moment.time), $('energy').width / page.dots - 4)}px)`;
@@ -59,15 +58,15 @@ function show(time, anew = false) {
 }
 
 function layout() {
-  if (!film || !$('main').clientWidth) return;  // there is no film yet, or it is not visible
-  tell();  // the stage takes the space that plots and texts leave
-  $('pressures').hidden = $('population').hidden = false;  // visible, so that they can be measured
+  if (!film || !$('main').clientWidth) return; // there is no film yet, or it is hidden
+  tell(); // first, because the stage takes the space that plots and texts leave
+  $('pressures').hidden = $('population').hidden = false; // visible, so that they can be measured
   layOutStage();
-  drawLegend();  // its texts depend on the size of the disks on the screen
+  drawLegend(); // its texts depend on the size of the disks on the screen
   tellLimits();
   layOutStage();
   for (const canvas of ['histogram', 'energy', 'pressure', 'inside', 'polygon'].map($)) {
-    const { clientWidth, clientHeight } = canvas;  // read once, because reading it forces a layout
+    const { clientWidth, clientHeight } = canvas; // read once, because reading it forces a layout
     Object.assign(canvas, { width: Math.round(clientWidth * page.dots), height: Math.round(clientHeight * page.dots) });
   }
   layTableOut();
@@ -95,7 +94,7 @@ function refresh() {
 
 const paceNow = () => live.on && live.newest ? live.pace : pace * 10 ** +$('pace').value;
 
-let ticking;  // the request of the next animation frame
+let ticking; // request of the next animation frame
 function play(on) {
   if (state.playing === on) return;
   state.playing = on;
@@ -134,7 +133,7 @@ const back = () => step(frameTime(moment.frame) < moment.time ? moment.frame : m
 const next = () => { if (!source.goOn?.('step')) step(moment.frame + 1); };
 const toEvent = () => { if (!$('event').hidden && !source.goOn?.('event')) go(source.nextEvent()); };
 
-// When the film is paused, the address of the page contains the time shown; the address can be used as a link to that time.
+// While the film is paused, the address of the page contains the time shown, so that it can serve as a link to that time.
 let remembering;
 function remember() {
   clearTimeout(remembering);
@@ -149,8 +148,8 @@ function fromAddress() {
 
 // ---------- mouse and touch input on the picture of the disks ----------
 
-const pointers = new Map();  // fingers or mouse buttons that are down
-let moved = 0;               // distance that they have moved [pixels]
+const pointers = new Map(); // fingers or mouse buttons that are down
+let moved = 0; // distance that they have moved [pixels]
 
 const onStage = ({ clientX, clientY }) => {
   const box = $('stage').getBoundingClientRect();
@@ -158,7 +157,7 @@ const onStage = ({ clientX, clientY }) => {
 };
 
 function look() {
-  $('stage').style.touchAction = camera.zoom > 1 ? 'none' : 'pan-y';  // without zoom a finger scrolls the page
+  $('stage').style.touchAction = camera.zoom > 1 ? 'none' : 'pan-y'; // without zoom, a finger scrolls the page
   press({ follow: camera.follow >= 0 });
   show(moment.time, true);
 }
@@ -170,16 +169,17 @@ function zoomBy(factor, px, py) {
 
 // ---------- in the laboratory: dragging of a side during the simulation, or of a disk during a pause ----------
 
-// { side }, { disk } or { tip } of an arrow, the pointer, its first position, the distance from there to the side, disk or tip, and when the worker was last told [ms]
+// { side }, { disk } or { tip } of an arrow; the pointer; its first position; the distance from there to the side, disk or tip;
+// and the time of the last message to the worker [ms]
 let grabbed = null;
-const GRIP = 14;  // greatest distance of the mouse from the side that it drags [CSS pixels]
-const CURSORS = ['ew-resize', 'ns-resize'];  // over a vertical and a horizontal side
+const GRIP = 14; // largest distance from which the mouse can drag a side [CSS pixels]
+const CURSORS = ['ew-resize', 'ns-resize']; // over a vertical and a horizontal side
 const HOLDABLE = [undefined, 'still', 'constant_velocity', 'piston'], TOLD_AGAIN = 100;
 const isFinger = ({ pointerType }) => pointerType === 'touch', reachOf = (event, mouse) => isFinger(event) ? 22 : mouse;  // [CSS pixels]
 
 const canHold = k => !film.periodic[k >> 1] && !past.at(-1)?.open[k] && HOLDABLE.includes(film.sides[k].motion);
 
-// Returns the number of the side near a point of the canvas, or -1 if there is none that the user can drag now.
+// Returns the index of the side near a point of the canvas, or -1 if there is none that can be dragged now.
 function sideAt(px, py, event) {
   if (!isPart || !state.playing || !stream.live) return -1;
   const [x0, x1, y0, y1] = sidesAt(moment.shown), reach = reachOf(event, GRIP) * page.dots;
@@ -187,8 +187,8 @@ function sideAt(px, py, event) {
   return gaps.findIndex((gap, k) => gap < reach && canHold(k));
 }
 
-// Returns the side or the disk at a point of the canvas, if the user can drag the side or the disk. Of the disks, a finger can drag
-// only the one whose trace is shown. A finger that starts on another disk scrolls the page or moves the picture.
+// Returns the side or the disk at a point of the canvas if it can be dragged. With a finger, only the disk whose trace is shown
+// can be dragged; a finger that starts on another disk scrolls the page or moves the picture.
 function grabAt(px, py, event) {
   if (!isPart) return null;
   const own = { pointer: event.pointerId, from: [px, py] }, away = (x, y) => [x - backAcross(px), y - backUp(py)];
@@ -202,8 +202,7 @@ function grabAt(px, py, event) {
   return side < 0 ? null : { ...own, side, away: side < 2 ? away(place, 0) : away(0, place), told: -Infinity };
 }
 
-// Returns whether the page must not be scrolled during the motion that drags a side or disk. A vertical motion along a left or right
-// side scrolls the page.
+// Returns whether dragging must not scroll the page. A vertical motion along a left or right side does scroll it.
 const keepsFromScrolling = () => grabbed !== null && !(grabbed.side < 2);
 
 function drag(px, py) {
@@ -223,7 +222,7 @@ function drag(px, py) {
   send({ do: 'hold', side, to: to[axis] });
 }
 
-// Ends the dragging. A gesture that the browser cancels leaves a disk where it was.
+// Ends the dragging. If the browser cancels the gesture, a disk stays where it was.
 function release(cancelled) {
   const { side, disk, tip, to, velocity, told } = grabbed;
   grabbed = null;
@@ -255,8 +254,8 @@ function pointerMoved(event) {
   look();
 }
 
-// Returns the disk nearest to a point of the canvas, or null if the distance of the point from the rim of the disk exceeds a limit
-// in CSS pixels. The disk is one of a list, or any.
+// Returns the disk nearest to a point of the canvas, or null if the point is farther than `distance` [CSS pixels] from its rim.
+// The disk is one of a list, by default of all disks.
 function diskAt(px, py, distance, list = Array(disks).keys()) {
   let nearest = null, least = distance * page.dots;
   for (const i of list) {
@@ -269,7 +268,7 @@ function diskAt(px, py, distance, list = Array(disks).keys()) {
   return nearest;
 }
 
-// Shows the path of the disk nearest to a point of the canvas, or no path if no disk is near.
+// Shows the path of the disk nearest to a point of the canvas, or no path if there is none nearby.
 function pick(px, py, event) {
   const i = diskAt(px, py, reachOf(event, 12));
   trace(i === null ? [] : [i]);
@@ -281,7 +280,7 @@ function trace(some) {
   look();
 }
 
-// A disk that leaves the box is no longer selected, unless the film was made to show its path.
+// Deselects a disk that leaves the box, unless the film was made to show its path.
 function deselectAbsent() {
   const isKept = i => isInside(i) || film.traced?.includes(i);
   if (state.traced.every(isKept)) return;
@@ -330,11 +329,11 @@ function listen() {
   stage.addEventListener('pointerdown', event => {
     const here = onStage(event);
     if (!pointers.size) [moved, grabbed] = [0, grabAt(...here, event)];
-    else if (moved < SLIP * page.dots) grabbed = null;  // two fingers zoom
+    else if (moved < SLIP * page.dots) grabbed = null; // two fingers zoom
     pointers.set(event.pointerId, here);
     stage.setPointerCapture(event.pointerId);
   });
-  // The browser sends this event after `pointerdown`. A listener that is not passive can keep the page from being scrolled.
+  // The browser sends this event after `pointerdown`. Only a listener that is not passive can prevent scrolling.
   stage.addEventListener('touchstart', event => { if (keepsFromScrolling()) event.preventDefault(); }, { passive: false });
   stage.addEventListener('pointermove', pointerMoved);
   stage.addEventListener('pointercancel', event => {

@@ -1,6 +1,6 @@
 // ---------- scenes of two to four disks: their velocities, restitution and number ----------
 
-// The film of a run of a few disks calls these functions.
+// Called by the film of a run of a few disks.
 const MOST_DISKS = 4;
 function redefine(name, variable, values) { set(`species.${name}.${variable}`, values.join(',')); }
 function restitution() { return numberOf('contact.restitution'); }
@@ -9,9 +9,10 @@ function bounce(value) { set('contact.restitution', String(value)); }
 const namesOfSpecies = () => [...state.groups.filter(({ kind }) => kind === 'species').map(({ place }) => place.slice(8)),
   ...state.added.filter(([kind]) => kind === 'species').map(([, name]) => name)];
 function canRemoveDisk() { return state.added.some(([kind]) => kind === 'species'); }
-const PLACES = [[0.5, 0.8], [0.5, 0.2], [0.2, 0.8], [0.8, 0.2], [0.2, 0.2], [0.8, 0.8], [0.5, 0.5]];  // of a further disk, in units of the box
+// positions for further disks, relative to the box
+const PLACES = [[0.5, 0.8], [0.5, 0.2], [0.2, 0.8], [0.8, 0.2], [0.2, 0.2], [0.8, 0.8], [0.5, 0.5]];
 
-// Starts a run with one more disk, like the first one, at rest at a free place.
+// Starts a run with an additional disk like the first one, at rest in a free place.
 function addDisk() {
   const names = namesOfSpecies(), first = `species.${names[0]}`, radius = textOf(`${first}.radius`);
   if (names.length >= MOST_DISKS) return;
@@ -29,7 +30,7 @@ function addDisk() {
   run();
 }
 
-// Starts a run without the disk that was added last.
+// Starts a run without the most recently added disk.
 function removeDisk() {
   const at = state.added.findLastIndex(([kind]) => kind === 'species');
   if (at < 0) return;

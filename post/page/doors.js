@@ -1,8 +1,8 @@
 // ---------- buttons of open systems: they let disks in, and open or close sides ----------
 
-const LET_IN = 50;  // largest number of disks that a button lets in
+const LET_IN = 50; // largest number of disks let in by one click
 
-// Labels the buttons of the newest run: one for each source, and one for each side that may be open.
+// Labels the buttons of the newest run: one for each source, and one for each side that can be open.
 function buildDoors({ sources, sides, surfaces }) {
   const ofSources = sources.map(source => [`add ${LET_IN} disks${sources.length > 1 ? ` (${source})` : ''}`, { do: 'pump', source, count: LET_IN }]);
   const ofSides = sides.flatMap(({ open }, side) => open === undefined ? [] : [[`${open ? 'close' : 'open'} ${surfaces[side]}`, { do: 'lid', side, open: !open }]]);

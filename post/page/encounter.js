@@ -1,15 +1,16 @@
 // ---------- teaching of collisions: velocities, momenta and energies of two to four disks ----------
 
-// In the laboratory, the page of a run of two to four disks between walls has a panel with momenta, energies and the last collision.
-// While the film is paused at its newest frame, the tips of the velocity arrows can be dragged, and the panel has fields for masses
-// and velocities. A change at the start of a run changes its input, and a later one the moving disks.
-const NO_SPEED = 1e-9;  // fraction of the typical speed below which a velocity is shown as 0
-const encounter = { input: '', speed: 1, mass: 1, collisions: [], rows: '' };  // typical speed and mass of the arrows; the collisions of two disks so far
+// In the laboratory, the page of a run of two to four disks between walls has a panel with momenta, energies and the last
+// collision. While the film is paused at its newest frame, the tips of the velocity arrows can be dragged, and masses and
+// velocities can be edited in the panel. At the start of a run this changes its input, later the moving disks.
+const NO_SPEED = 1e-9; // fraction of the typical speed below which a velocity is shown as 0
+// typical speed and mass of the arrows; disk-disk collisions so far
+const encounter = { input: '', speed: 1, mass: 1, collisions: [], rows: '' };
 const isEncounter = () => !!film?.masses;
 const isCentred = () => state.centred && isEncounter();
 const canAim = () => isEncounter() && !state.centred && !state.playing && moment.time === last();
 
-// Returns mass, momentum, kinetic energy, centre of mass and its velocity for given velocities of all disks.
+// Returns total mass, momentum, kinetic energy, centre of mass and its velocity, given the velocities of all disks.
 function totals(velocity = i => [VX[i], VY[i]]) {
   const all = { mass: 0, px: 0, py: 0, x: 0, y: 0, energy: 0 };
   film.masses.forEach((mass, i) => {
@@ -24,14 +25,14 @@ function totals(velocity = i => [VX[i], VY[i]]) {
   return { ...all, x: all.x / all.mass, y: all.y / all.mass, vx: all.px / all.mass, vy: all.py / all.mass };
 }
 
-// Velocity of the frame of reference in which velocities are shown.
+// Returns the velocity of the frame of reference in which velocities are shown.
 function frameVelocity() {
   if (!isCentred()) return [0, 0];
   const { vx, vy } = totals();
   return [vx, vy];
 }
 
-// The scale of the arrows stays the same while the user changes velocities, unless an arrow would be very long or short.
+// The scale of the arrows does not change while the user edits velocities, unless an arrow would become very long or short.
 function prepareEncounter() {
   document.documentElement.classList.toggle('encounter', isEncounter());
   $('encounter').hidden = !isEncounter();
@@ -45,10 +46,10 @@ function prepareEncounter() {
 
 // ---------- the arrows ----------
 
-// Speed for which an arrow has the length of the mean distance between neighbouring disks.
+// Returns the speed whose arrow is as long as the mean distance between neighbouring disks.
 const arrowSpeed = () => isEncounter() ? encounter.speed : film.scales.speed[1];
 
-// Returns the position in the box at which the arrow of a disk ends.
+// Returns the position in the box of the tip of a disk's arrow.
 function tipOf(i) {
   const length = arrowScale() / view.unit;
   return [X[i] + VX[i] * length, Y[i] + VY[i] * length];
@@ -65,7 +66,7 @@ function tipAt(px, py, event) {
   return nearest < reach ? away.indexOf(nearest) : null;
 }
 
-// Rounds a dragged velocity or position to a step that the input file shows with few digits.
+// Rounds a dragged velocity or position to a step with few digits, for the input file.
 const stepOf = value => 10 ** Math.floor(Math.log10(value)) / 20, toStep = (value, step) => +(Math.round(value / step) * step).toPrecision(6);
 
 function dragTip(i, x, y) {
@@ -77,7 +78,7 @@ function dragTip(i, x, y) {
 
 const nameIfAlone = i => kinds[speciesOf[i]].count === 1 ? kinds[speciesOf[i]].name : null;
 
-// Changes the velocity or the position of a disk: in the input at the start of a run, later in the running simulation.
+// Changes the velocity or position of a disk, at the start of a run in its input, later in the running simulation.
 function redefine(i, variable, values) {
   if (isEncounter() && last() === 0 && nameIfAlone(i)) parent.redefine(nameIfAlone(i), variable, values);
   else if (variable === 'position') send({ do: 'place', disk: i, position: values });
@@ -93,7 +94,7 @@ function drawArrow(x, y, dx, dy, width, colour) {
   marks.fill(new Path2D(`M${x + dx},${y + dy}L${bx - head / 2 * ey},${by + head / 2 * ex}L${bx + head / 2 * ey},${by - head / 2 * ex}Z`));
 }
 
-// Draws momenta as thick arrows, below the arrows of the velocities, and the centre of mass with the total momentum.
+// Draws momenta as thick arrows below the velocity arrows, and the centre of mass with the total momentum.
 function drawMomenta() {
   const [ux, uy] = frameVelocity(), length = arrowScale() / encounter.mass, all = totals(), width = 6 * page.dots;
   marks.globalAlpha = 0.6;
@@ -106,7 +107,7 @@ function drawMomenta() {
   ring(all.x, all.y, r);
 }
 
-// Draws a circle at the end of each arrow that can be dragged.
+// Draws a circle at the tip of each arrow that can be dragged.
 function drawHandles() {
   if (!canAim() || !state.arrows) return;
   for (let i = 0; i < disks; i++) {
@@ -123,11 +124,11 @@ function drawHandles() {
 // ---------- the panel ----------
 
 const exactly = (value, scale, digits = 6) => Math.abs(value) < NO_SPEED * scale ? '0' : String(+value.toPrecision(digits)).replace('-', '−');
-// With 4 digits of the largest value, so that the rows of a column have equally many decimals and can be added.
+// Shows 4 digits of the largest value, and thus the same number of decimals in each row of a column.
 const alike = (value, scale) => exactly(+value.toFixed(Math.min(Math.max(3 - Math.floor(Math.log10(scale)), 0), 20)), scale);
 const cellsOf = (row, tag) => `<tr>${row.map(one => `<${tag}>${one}</${tag}>`).join('')}</tr>`;
 
-// Makes a row for each disk, with fields for its mass and its velocity. The rows are made anew only if the disks are others.
+// Makes a row with fields for mass and velocity for each disk, unless the rows for these disks exist.
 function buildBodies() {
   const names = film.masses.map((_, i) => nameIfAlone(i) ?? i), rows = `${stream.wish.input} ${names}`;
   $('fewer').disabled = !parent.canRemoveDisk();
@@ -144,7 +145,7 @@ function buildBodies() {
   }));
 }
 
-const ofFrame = value => +value.toPrecision(7);  // frames have single precision
+const ofFrame = value => +value.toPrecision(7); // frames have single precision
 
 function enter(i, k, field) {
   const value = Number(field.value.trim().replace(',', '.').replace('−', '-'));
@@ -158,7 +159,7 @@ function tellEncounter() {
   if (!isEncounter()) return;
   const [ux, uy] = frameVelocity(), all = totals(), p = encounter.mass * encounter.speed, e = p * encounter.speed, { speed } = encounter;
   const rows = film.masses.map((mass, i) => [mass, VX[i] - ux, VY[i] - uy, mass * (VX[i] - ux), mass * (VY[i] - uy), mass * ((VX[i] - ux) ** 2 + (VY[i] - uy) ** 2) / 2]);
-  const frame = all.mass * (ux * ux + uy * uy) / 2;  // energy of the motion of the frame
+  const frame = all.mass * (ux * ux + uy * uy) / 2; // energy due to the motion of the frame of reference
   rows.push([all.mass, all.vx - ux, all.vy - uy, all.px - all.mass * ux, all.py - all.mass * uy, all.energy - frame]);
   const scales = [1e-9, speed, speed, p, p, e], aims = canAim();
   rows.forEach((row, i) => row.forEach((value, k) => {
@@ -206,7 +207,7 @@ function drawPolygon() {
   const [[x0, x1], [y0, y1]] = [range(0), range(1)], long = steps.reduce((sum, [px, py]) => sum + Math.hypot(px, py), 0) || 1;
   const unit = Math.min((width - 30) / long, (height - 24) / Math.max(y1 - y0, 0.3 * long));
   const x = px => width / 2 + (px - (x0 + x1) / 2) * unit, y = py => height / 2 - (py - (y0 + y1) / 2) * unit;
-  const apart = (y1 - y0) * unit < 12 ? 9 : 0;  // distance of arrows that would cover each other [CSS pixels]
+  const apart = (y1 - y0) * unit < 12 ? 9 : 0; // offset of arrows that would cover each other [CSS pixels]
   const arrow = (k, from, to, colour, dash) => {
     const [ax, bx] = [x(from[0]), x(to[0])], [ay, by] = [from, to].map(one => y(one[1]) + (k - disks / 2) * apart);
     const [dx, dy] = [bx - ax, by - ay], size = Math.hypot(dx, dy), head = Math.min(7, size) / (size || 1);

@@ -3,15 +3,16 @@
 // ---------- data of the film, which comes from a file or from a worker process ----------
 
 const $ = id => document.getElementById(id);
-let film, disks, kinds;         // the facts of the film; the number of disks; the species
-let speciesOf, sizeOf, masses;  // of each disk: number of its species, number of its size, mass
-let X, Y, VX, VY;               // positions and velocities at the present moment; positions are wrapped into a periodic box
-let UX, UY, HITS;               // positions that are continuous since the previous frame; events since that frame
-let angles;                     // orientations at the present moment, if the disks have any
-let source;                     // where frames and events come from: a file or a worker
-let past = [];                  // the frames: time, position and velocity (x1 y1 x2 y2 ...), angle, periods crossed since the first frame, ...
-let origins;                    // the positions x1 y1 x2 y2 ... from which displacements are measured
-const moment = { time: 0, shown: 0, frame: 0, inside: [], kinetic: [], potential: [], collisions: 0 };  // `inside`: disks of each species in the box
+let film, disks, kinds; // facts of the film; number of disks; species
+let speciesOf, sizeOf, masses; // by disk: index of its species, index of its size, mass
+let X, Y, VX, VY; // present positions and velocities; positions are wrapped into a periodic box
+let UX, UY, HITS; // positions continuous since the previous frame; events since that frame
+let angles; // present orientations, if the disks have any
+let source; // source of frames and events: a file or a worker
+let past = []; // frames: time, position and velocity (x1 y1 x2 y2 ...), angle, image counters relative to the first frame, ...
+let origins; // positions x1 y1 x2 y2 ... from which displacements are measured
+// `inside`: disks of each species in the box
+const moment = { time: 0, shown: 0, frame: 0, inside: [], kinetic: [], potential: [], collisions: 0 };
 
 function bytes(text) {
   const letters = atob(text), array = new Uint8Array(letters.length);
@@ -19,7 +20,7 @@ function bytes(text) {
   return array;
 }
 
-// Stores the simulation box, the disks and the properties of the disks.
+// Stores the box, the disks and their properties.
 function setScene(facts, blocks) {
   film = facts;
   kinds = film.species;
@@ -32,14 +33,14 @@ function setScene(facts, blocks) {
   past = [];
 }
 
-// The position of a disk outside of the box is NaN, and no such disk is drawn.
+// Positions of disks outside the box are NaN; such disks are not drawn.
 const isInside = i => !isNaN(X[i]);
 
 const first = () => past[0].time, last = () => past.at(-1).time;
 const sumOf = values => values.reduce((sum, one) => sum + one, 0);
 const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
 
-// Returns the number of elements of a sorted list that do not exceed a value, found by binary search.
+// Returns the number of elements of a sorted list that do not exceed a value, by binary search.
 function upTo(values, value, number = one => one) {
   let low = 0, high = values.length;
   while (low < high) {
@@ -49,25 +50,27 @@ function upTo(values, value, number = one => one) {
   return low;
 }
 
-const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1);  // the last frame that is not later
+const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1); // the last frame at or before this time
 const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
 
-// Stores in a frame the numbers of periods of the box that each disk has crossed since the first frame, in the order x1, y1, x2,
-// y2 and so on. For each coordinate of a disk, the function `moved` returns the number of periods crossed since the previous frame.
+// Stores in a frame the image counters of each disk (box periods crossed since the first frame), in the order x1, y1, x2, y2 and
+// so on. `moved` returns how much a counter has changed since the previous frame.
 function cross(frame, moved) {
   const before = past.at(-1);
-  if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);  // 0 for a disk outside
+  // 0 for a disk outside
+  if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);
   return frame;
 }
 
 // ---------- motion of the disks between frames ----------
 
-// Positions between two frames are calculated from the positions in the earlier frame and from the velocity changes in the event
-// log. Between collisions a disk moves along a straight line, or along a parabola under gravity. Without an event log, each disk is
-// shown at its position in the latest frame before the present time. Frames from a worker process are so close in time that no
-// event log is needed.
-let ways;    // velocity changes: index of the first change after each frame (start); disk, fraction of the interval and new velocity of each change (turns)
-let events;  // events of the log: time (when), partners (i, j), number of collisions of two disks so far (pairs)
+// Positions between two frames are calculated from the earlier frame and the velocity changes in the event log. Between
+// collisions a disk moves along a straight line or, under gravity, a parabola. Without an event log, each disk is shown at its
+// position in the last frame. Frames from a worker process follow each other so closely that no event log is needed.
+// velocity changes. start: index of the first change after each frame; turns: disk, fraction of the
+// interval and new velocity of each change
+let ways;
+let events; // events of the log: time (when), partners (i, j), number of disk-disk collisions so far (pairs)
 
 function move(time) {
   moment.time = clamp(time, first(), last());
@@ -118,11 +121,10 @@ function move(time) {
   Object.assign(moment, { inside, kinetic: kinetic.map(mean), potential: potential.map(mean) });
 }
 
-// Returns for each side whether it is open, at the time shown.
+// Returns for each side whether it is open at the time shown.
 const openSides = () => past[moment.frame].open ?? film.open.findLast(([time]) => time <= moment.shown)[1];
 
-// Returns the positions of the left, right, bottom and top side of the box at a given time. The returned positions of the sides are
-// used only for drawing.
+// Returns the positions of the left, right, bottom and top side of the box at a given time, for drawing only.
 function sidesAt(time) {
   return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase, velocity, start_time: start, end_time: end, way }, k) => {
     if (way?.[0].length > 1) {
@@ -142,9 +144,9 @@ function displacement(i) {
   return Math.hypot(UX[i] + x - origins[2 * i], UY[i] + y - origins[2 * i + 1]);
 }
 
-// Returns the free flights of a disk between two times. Each flight has a start, an end, and the offset of the control point of a
-// parabola, which is (0, 0) for a straight line. Without an event log, the flights are straight lines between the positions in
-// successive frames. If a disk has been recycled between two frames, its path between these frames is left out. So is the path of a disk that is outside of the box.
+// Returns the free flights of a disk between two times. A flight has a start, an end, and the offset of the control point of its
+// parabola, (0, 0) for a straight line. Without an event log, straight lines connect the positions in successive frames. Paths of
+// recycled disks between the frames before and after, and of disks outside the box, are left out.
 function flights(i, from, to) {
   const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
   for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {
@@ -165,8 +167,7 @@ function flights(i, from, to) {
   return result;
 }
 
-// Calls `action` for the speed of each disk in each frame received so far. If there are very many frames, the speeds of only a part
-// of the frames are used.
+// Calls `action` for the speed of each disk in each frame received so far or, if there are very many, in some of the frames.
 function eachSpeed(action) {
   const some = Math.ceil((moment.frame + 1) * disks / 2e6);
   for (let k = moment.frame; k >= 0; k -= some)

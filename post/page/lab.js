@@ -3,21 +3,21 @@
 // ---------- laboratory: an input form and several films, each of which has its own worker process ----------
 
 const $ = id => document.getElementById(id);
-const lab = JSON.parse($('data').textContent);  // the table of variables by group, and the inputs to choose from
+const lab = JSON.parse($('data').textContent); // table of variables by group, and the inputs to choose from
 const state = {
-  input: null, groups: [],   // the input (name, title, sliders, ...); the groups of its file with kind, address and values
-  settings: {}, added: [],   // variables that the form changes, with their texts; groups that are not in the file: [kind, name]
-  has: {},                   // the settings of the present run
-  waiting: {},               // variables with a text that was refused: the text and the message
-  runs: 0,                   // number of runs so far
-  boxes: [],                 // kept runs { figure, frame, letter, words, run, shown }, and the present one at the end
-  paused: false, started: false, note: '',   // whether the films are paused, and the input has a run; what is wrong with the address
+  input: null, groups: [], // the input (name, title, sliders, ...); the groups of its file, with kind, address and values
+  settings: {}, added: [], // variables that the form changes, with their texts; groups that are not in the file: [kind, name]
+  has: {}, // settings of the present run
+  waiting: {}, // variables whose text was refused, with text and message
+  runs: 0, // number of runs so far
+  boxes: [], // runs { figure, frame, letter, words, run, shown } kept for comparison, and the present one at the end
+  paused: false, started: false, note: '', // whether the films are paused; whether the input has a run; error in the address
 };
-// The variables in this list can be changed while a simulation runs. A change of any other variable starts a new run.
+// Variables that can be changed while a simulation is running. Changing any other variable starts a new run.
 const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|surface_velocity|velocity|mass|force|open)|source\.\w+\.(count|interval|velocity|temperature|\w+_time))/.test(key);
 const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', virial_pressure: 'pressure', dissipated_energy: 'energy lost per time', collisions: 'collisions per time' };
 const IMPOSSIBLE = 'One value is not possible: the form says why.';
-const MOST_KEPT = 3, FULL = 0.5;  // number of kept runs; packing fraction that random placement reaches easily
+const MOST_KEPT = 3, FULL = 0.5; // largest number of kept runs; packing fraction that random placement reaches easily
 
 function make(tag, more = {}, ...children) {
   const element = Object.assign(document.createElement(tag), more);
@@ -38,7 +38,7 @@ function set(key, text) {
   const old = textOf(key);
   delete state.waiting[key];
   state.note = '';
-  delete state.settings[key];  // so that the newest setting is the last in the list
+  delete state.settings[key]; // makes the latest setting the last in the list
   if (text !== givenAs(key)) state.settings[key] = text;
   sync();
   if (text !== old) changed(key);
@@ -47,7 +47,7 @@ function set(key, text) {
 const wish = () => ({ input: state.input.name, added: state.added, settings: { ...state.settings } });
 const differs = key => (state.settings[key] ?? givenAs(key)) !== (state.has[key] ?? givenAs(key));
 
-// Returns a variable and its value as text; the label of the slider is used or, without a slider, the name of the variable.
+// Returns a variable and its value as text, with the label of its slider or else its name.
 function inWords([key, value]) {
   if (/^side\.\w+\.open$/.test(key)) return doorInWords(key, value);
   const slider = state.input.sliders.find(one => one.key === key);
@@ -55,11 +55,11 @@ function inWords([key, value]) {
 }
 
 const settingsInWords = () => Object.entries(wish().settings).map(inWords).join(' · ') || 'as in the file';
-const changeInWords = ([, key, value]) => key ? inWords([key, value]) : value;  // a change without a variable consists of words
+const changeInWords = ([, key, value]) => key ? inWords([key, value]) : value; // a change without a variable is already in words
 
 // ---------- sliders ----------
 
-// Each slider is described by [variable or variable[component], label, smallest value, largest value, 'log' for a logarithmic
+// A slider is described by [variable or variable[component], label, smallest value, largest value, 'log' for a logarithmic
 // scale].
 function sliderOf([name, text, from, to, log]) {
   const [key, at] = name.replace(']', '').split('[');
@@ -68,7 +68,7 @@ function sliderOf([name, text, from, to, log]) {
 
 const textWith = ({ key, at }, text) => at < 0 ? text : split(valueOf(key)).map((one, k) => k === at ? text : one).join(',');
 
-// Returns the largest slider value for which the packing fraction of the disks in their region does not exceed a limit.
+// Returns the largest slider value for which the packing fraction of the disks in their region stays below a limit.
 function mostOf({ key, to = Infinity }) {
   const [kind, name, variable] = key.split('.');
   if (kind !== 'species' || !['count', 'radius'].includes(variable) || textOf(`species.${name}.placement`)) return to;
@@ -85,7 +85,7 @@ function mostOf({ key, to = Infinity }) {
   return isFinite(most) ? Math.min(to, most) : to;
 }
 
-// Returns rounded values, without repetitions, that cover the range of a slider.
+// Returns distinct rounded values that cover the range of a slider.
 function valuesOf(spec, steps) {
   const { key, from, to, log } = spec, top = mostOf(spec), whole = variableOf(key).type === 'integer';
   const unit = whole ? 1 : 10 ** Math.floor(Math.log10((to - from) / 100));
@@ -93,8 +93,8 @@ function valuesOf(spec, steps) {
   return [...new Set(Array.from({ length: steps + 1 }, (_, k) => near(log ? from * (top / from) ** (k / steps) : from + k / steps * (top - from))))];
 }
 
-// The simulation program checks the text that the user types. The program accepts no decimal comma; therefore commas are replaced
-// by points first.
+// The simulation program checks the text that the user types. It accepts no decimal commas, which are therefore replaced by
+// points.
 function buildSlider(spec) {
   const { key, at } = spec, id = 'slide.' + key + at;
   const range = make('input', { type: 'range', min: 0, id }), field = make('input', { inputMode: 'text', spellcheck: false });
@@ -175,8 +175,8 @@ function addGroup(kind, name) {
 
 // ---------- choice of an input file ----------
 
-// Unless the address of the page contains values, the run starts before the form is complete, so that disks appear early. Kept runs
-// of another input are removed, because runs of different inputs cannot be compared in one plot.
+// Unless the address of the page contains values, the run starts before the form is complete, so that disks appear early. Kept
+// runs of another input are removed, because runs of different inputs cannot be compared in one plot.
 async function choose(name, settings = {}) {
   const input = lab.inputs.find(one => one.name === name);
   if (name !== state.input?.name) {
@@ -196,7 +196,7 @@ async function choose(name, settings = {}) {
   const answer = await fetch('form?' + encodeURIComponent(name)).catch(() => null);
   if (!answer?.ok) { tell(answer ? await answer.text() : 'No answer: the laboratory has ended.', true); return; }
   const form = await answer.json();
-  if (state.input.name !== name) return;  // another input has been chosen meanwhile
+  if (state.input.name !== name) return; // another input has been chosen meanwhile
   state.groups = form.groups;
   if (!isPlain) begin(settings);
   $('about').replaceChildren(...form.about.split(/\n\n+/).map(text => make('p', { textContent: text })));
@@ -206,7 +206,7 @@ async function choose(name, settings = {}) {
   sync();
 }
 
-// Starts a run with the values of variables in the address of the page. Groups that the input file lacks are added.
+// Starts a run with the values in the address of the page, adding groups that the input file lacks.
 function begin(settings) {
   const keys = Object.keys(settings), wrong = keys.find(key => !isVariable(key));
   state.settings = Object.fromEntries(keys.filter(isVariable).map(key => [key, settings[key]]));
@@ -255,8 +255,8 @@ function newBox() {
   return box;
 }
 
-// Two runs are never started at the same time. If values change during the start of a run, the changes take effect in the next run.
-const PLACING = 2000;  // time [ms] after which a placement of disks is given up for newer settings
+// Two runs never start at the same time: values changed during the start of a run take effect in the next one.
+const PLACING = 2000; // time after which placing disks is abandoned in favour of newer settings [ms]
 let busy = 0, again = false, timer, latest = {};
 function run() {
   timer = clearTimeout(timer);
@@ -267,7 +267,7 @@ function run() {
   if (busy && isThere(box)) filmOf(box).leave();
   busy = now;
   tell('');
-  state.paused = !!state.input.paused;  // the film of some inputs waits at its start
+  state.paused = !!state.input.paused; // the films of some inputs wait at the start
   tellPause();
   const begin = () => {
     box.frame.onload = null;
@@ -276,18 +276,17 @@ function run() {
     box.wished = { ...wish(), words: settingsInWords(), run: ++state.runs };
     filmOf(box).start(box.wished);
   };
-  if (isThere(box)) begin(); else box.frame.onload = begin;  // the newest request replaces an earlier request that waits for the frame
+  if (isThere(box)) begin(); else box.frame.onload = begin; // replaces an earlier request that waits for the frame
 }
 
-// If a running simulation allows the change of a variable, the change takes effect while the slider moves. If a change cannot take
-// effect in a running simulation, the change starts a new run.
+// Applies a change while the slider moves, if a running simulation allows it, or else starts a new run.
 function changed(key) {
   if (busy || !acts(key) || !current()?.run) { run(); return; }
   latest[key] = state.settings[key] ?? givenAs(key);
   timer ??= setTimeout(() => { filmOf(current()).send({ do: 'change', settings: latest }); latest = {}; timer = undefined; }, 25);
 }
 
-// Handles the messages that the worker process of a film sends.
+// Handles messages from the worker process of a film.
 function hear(source, news) {
   const box = state.boxes.find(one => one.frame.contentWindow === source);
   if (!box) return;
@@ -302,7 +301,8 @@ function hear(source, news) {
     tell(Object.keys(state.waiting).length ? IMPOSSIBLE : state.note, !!state.note);
     arrangeAll();
   } else if (news.is === 'problems') {
-    if (!news.change) { showProblems(news.problems); ready(); } else if (!busy) run();  // the variable cannot change in a running simulation
+    // the variable cannot change in a running simulation
+    if (!news.change) { showProblems(news.problems); ready(); } else if (!busy) run();
   } else if (news.is === 'state') {
     box.changes = news.changes ?? box.changes;
     if (box === current()) for (const [, key, value] of box.changes) if (key) state.has[key] = value;
@@ -320,9 +320,8 @@ function hear(source, news) {
 
 function ready() { busy = 0; if (again) run(); }
 
-// Shows each error message once, beside the variable that caused the error. If the message names no variable, it is shown beside
-// the variable that changed last. The refused text stays visible in the form, but the variable keeps its old value. All changes
-// that cause no error take effect.
+// Shows each error message once, beside the variable that caused it or, if it names none, beside the variable that changed last.
+// The refused text stays in the form while the variable keeps its old value. All changes without errors take effect.
 function showProblems(problems) {
   const changes = () => Object.keys({ ...state.has, ...state.settings }).filter(differs), before = changes();
   for (const { place, text } of problems) {
@@ -354,8 +353,8 @@ function remove(box) {
   regroup();
 }
 
-// Arranges the films after one of them has been shown, hidden or removed. Unless the films are paused, all of them continue from
-// the same time.
+// Arranges the films after one of them has been shown, hidden or removed. Unless they are paused, all continue from the same
+// time.
 function regroup() {
   clock.next = null;
   arrangeAll();
@@ -364,7 +363,7 @@ function regroup() {
 
 const whatIs = ({ words: text, changes }) => text + (changes.length ? `, then ${changeInWords(changes.at(-1))}` : '');
 
-// Returns the line above the film of a run. Above a run that repeats the run before it, the line says how to change that.
+// Returns the line above the film of a run. If the run only repeats the previous one, the line says how to change that.
 function captionOf(box) {
   const before = shownBoxes().at(-2), text = whatIs(box);
   return `${box.letter}: ${box === current() && before && whatIs(before) === text ? 'change a slider' : text}`;
@@ -388,7 +387,7 @@ function tellShelf() {
   state.boxes.forEach(box => { box.figure.firstChild.textContent = captionOf(box); });
 }
 
-// Returns the width of a scroll bar beside the content of an element [CSS pixels]; touch screens have none.
+// Returns the width of the scroll bar of an element [CSS pixels]; touch screens have none.
 function widthOfScrollBar() {
   const box = document.body.appendChild(make('div', { className: 'measure' })), width = box.offsetWidth - box.clientWidth;
   box.remove();
@@ -399,8 +398,8 @@ const scrollBar = widthOfScrollBar();
 // Returns the run whose film contains the controls and the plots: the newest run, as soon as it has a picture.
 const leader = () => isThere(current()) && filmOf(current()).inside().film ? current() : shownBoxes().at(-2) ?? current();
 
-// Arranges the films of all runs side by side, with equal sizes. The plots are part of the film of one run and include the curves of
-// the other runs.
+// Arranges the films of all runs side by side at equal size. The plots belong to the film of one run, and include curves of the
+// others.
 function arrangeAll() {
   const boxes = shownBoxes(), many = isComparing(), { clientWidth, clientHeight } = $('runs');
   const upright = clientWidth < 560, count = many ? boxes.length : 1, edge = parseFloat(getComputedStyle($('runs')).paddingLeft);
@@ -426,7 +425,7 @@ function arrangeAll() {
   drawScan();
 }
 
-// Moves the pictures of the other runs together with the page of the run that contains the plots.
+// Scrolls the pictures of the other runs along with the page of the run that contains the plots.
 function scrolled() {
   const by = isComparing() ? Math.max(0, filmOf(leader()).scrollY) : 0;
   $('runs').style.setProperty('--scrolled', `${by}px`);
@@ -446,16 +445,15 @@ setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
 
 // ---------- the time of compared runs ----------
 
-// The newest film determines the time that all films show. The next time is requested from all
-// worker processes, and the films show this time as soon as the slowest worker has reached it.
-// While a film replays stored frames, the requested times are times of these frames. Times at which
-// another film lacks a frame are left out, because that film would show an earlier time.
-const clock = { next: null, shown: 0 };  // the time requested; when the films were last drawn [ms]
+// The newest film determines the time that all films show. The next time is requested from all worker processes, and shown once
+// the slowest has reached it. While a film replays stored frames, the requested times are those of its frames, except times at
+// which another film has no frame and would have to show an earlier one.
+const clock = { next: null, shown: 0 }; // time requested; when the films were last drawn [ms]
 function conducts(source) {
   if (!isComparing()) return false;
   if (source !== filmOf(current())) return true;
   const all = films(), now = performance.now();
-  if (all.some(one => one.isStarting())) return true;  // such a film still has the time of its previous run
+  if (all.some(one => one.isStarting())) return true; // such a film still shows the time of its previous run
   if (clock.next === null) request(all, 1 / 60);
   if (clock.next === null || !all.every(one => one.hasReached(clock.next))) return true;
   for (const one of all) one.show(clock.next);
@@ -475,13 +473,13 @@ function request(all, passed) {
   if (clock.next !== null) for (const one of all) one.reach(clock.next);
 }
 
-// If the films are paused and the user moves one film to another time, all other films show that time, too.
+// If the films are paused and the user moves one of them to another time, all others show that time, too.
 function went(source, time) {
   clock.next = null;
   if (state.paused) for (const one of films()) if (one !== source) one.join(time);
 }
 
-// Repeats an action on one film in all other films.
+// Repeats an action on one film in all others.
 function played(source, on) {
   if (source === filmOf(current())) state.paused = !on;
   for (const one of films()) if (one !== source && one.inside().film) one.play(on);
@@ -497,7 +495,7 @@ function paced(source) {
 
 // ---------- scan: measurement of one quantity for five values of an input variable ----------
 
-let scan, scanner;  // the measured quantity and values; the worker that measures
+let scan, scanner; // measured quantity and values; the worker that measures
 function beginScan() {
   const spec = state.input.sliders[$('scanned').value], { key, log } = spec, values = valuesOf(spec, 4), texts = values.map(value => textWith(spec, String(value)));
   scan = { x: spec.words, y: MEASURED[$('measured').value], log, points: [], values, said: '' };
@@ -516,7 +514,7 @@ function drawScan() {
   $('curve').setAttribute('aria-label', $('points').textContent);
 }
 
-function addToScan({ is, index, mean, error, problems }) {  // values that cannot be measured appear as a gap
+function addToScan({ is, index, mean, error, problems }) { // values that cannot be measured appear as a gap
   if (problems) scan.said = (is === 'scan' ? `${short(scan.values[index])}: ` : '') + problems[0].text;
   else scan.points.push([scan.values[index], mean, error]);
   drawScan();
@@ -534,7 +532,7 @@ function bare(on) {
   arrangeAll();
 }
 
-// All films use the same colour theme (dark or light) as the page.
+// Gives all films the colour theme (dark or light) of the page.
 function dress() {
   for (const one of state.boxes.filter(isThere).map(filmOf)) {
     one.document.documentElement.classList.toggle('larger', document.documentElement.classList.contains('larger'));
@@ -553,14 +551,14 @@ const actions = {
   another: () => { if ($('add').value) addGroup(...$('add').value.split(' ')); },
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
-const MOVES = new Set(['ArrowLeft', 'ArrowRight', 'Home', 'End', 'n', ' ']);  // keys that act on the newest film, which the others follow
+const MOVES = new Set(['ArrowLeft', 'ArrowRight', 'Home', 'End', 'n', ' ']); // keys that act on the newest film, which the others follow
 const keys = { r: 'run', p: 'pause', c: 'keep', s: 'settings', l: 'larger' };
 
-// Keyboard shortcuts of the laboratory work unless an input field or a selection menu has the keyboard focus. Keyboard shortcuts
-// for films apply to the film with the focus, or to all films if no film has the focus.
+// Keyboard shortcuts of the laboratory work unless an input field or a menu has the focus. Shortcuts for films apply to the film
+// with the focus or, if there is none, to all films.
 function typed(event) {
   const { key, target } = event, own = target.ownerDocument === document;
-  if (key === 'Enter' && target.matches('input:not([type])')) target.blur();  // the text is complete: the next keys are shortcuts
+  if (key === 'Enter' && target.matches('input:not([type])')) target.blur(); // the text is complete, so the next keys are shortcuts
   if (target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || $('inputs').open) return;
   if (keys[key]) actions[keys[key]]();
   else if (own && !(target.matches('input') && /^(Arrow|Home|End|Page)/.test(key)) && !(key === ' ' && target.matches('input, button, summary'))) {
@@ -580,7 +578,7 @@ document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark
 buildInputs();
 newBox();
 const narrow = matchMedia('(max-width: 1099px), (max-height: 500px)');
-narrow.addEventListener('change', () => bare(narrow.matches));  // the form is then a drawer, which is closed at first
+narrow.addEventListener('change', () => bare(narrow.matches)); // the form then becomes a drawer, which is initially closed
 bare(narrow.matches);
 addEventListener('hashchange', fromAddress);
 fromAddress();

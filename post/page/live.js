@@ -1,8 +1,8 @@
 // ---------- film of a run that has not finished ----------
 
-// If `player.py --live` made the page, the page requests new frames from the server of that script until the run ends. The pace of
-// the film is chosen such that the newest frame is reached when the next answer is expected. The user can move from the newest
-// frame to any other time of the film. In the laboratory, the page receives the frames from a worker process.
+// A page made by `player.py --live` requests new frames from the server of that script until the run ends. The film is paced so
+// that it reaches the newest frame when the next answer is expected. The user can move to any earlier time of the film. In the
+// laboratory, a worker process sends the frames instead.
 const enclosed = JSON.parse($('film').textContent);
 const isPart = parent !== window && !enclosed;
 const live = { on: false, stamp: '', newest: true, heard: 0, pace: 0 };

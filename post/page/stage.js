@@ -3,19 +3,18 @@
 
 const layers = ['ground', 'disks', 'marks'].map($);
 const [ground, disksBrush, marks] = layers.map((layer, k) => layer.getContext('2d', { willReadFrequently: k === 1 }));
-let ink;                       // the colours of the theme
-let picture, pixels, palette, paper;  // image of the disks; its pixels as integers; colours of disks and of the ground in the same format
-let radii;                     // of each size [pixels]
-let warmest, sliding;          // the highest temperature of a boundary; whether a boundary slides
-let groundShown, marked;       // the view for which the ground was drawn; whether the layer of marks contains marks
+let ink; // colours of the theme
+let picture, pixels, palette, paper; // image of the disks; its pixels as integers; colours of disks and background in the same format
+let radii; // of each size [pixels]
+let warmest, sliding; // highest temperature of a boundary; whether a boundary slides
+let groundShown, marked; // view for which the ground was drawn; whether the layer of marks contains marks
 
 const dark = () => document.documentElement.dataset.theme === 'dark';
 const cssColour = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
 const css = rgb => `rgb(${rgb})`;
 
-// In both colour themes the disks have a contrast of at least 3:1 to the background. Because the luminance
-// increases along each colour scale and differs between species, the colours of different values or of different species can be
-// distinguished in greyscale.
+// In both colour themes, disks have a contrast of at least 3:1 to the background. Luminance increases along each colour scale and
+// differs between species, so that different values and species can be distinguished in greyscale.
 const VIRIDIS = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]];
 const LIGHTS = { false: [0.02, 0.29, [0.11, 0.28, 0.04, 0.2, 0.07]], true: [0.14, 0.85, [0.27, 0.5, 0.14, 0.38, 0.2]] };
 const toLinear = part => part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4;
@@ -37,12 +36,12 @@ function scaleColour(place) {
   return withLuminance(VIRIDIS[k].map((part, c) => part + (at - k) * (VIRIDIS[k + 1][c] - part)), low + (high - low) * place / 255);
 }
 
-// Each function in `quantities` returns the value of one quantity for a disk at the time shown, scaled to the range from 0 to 1.
-// If colours show the species, no function in `quantities` is used.
+// Each function returns the value of a quantity for a disk at the time shown, scaled to the range from 0 to 1. If colours
+// represent species, none of them is used.
 const quantities = {
   speed: i => Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]) / film.scales.speed[1],
   displacement: i => displacement(i) / film.scales.displacement[1],
-  collisions(i) {  // on a logarithmic scale
+  collisions(i) { // on a logarithmic scale
     const scale = Math.log1p(film.scales.collisions[1]), before = past[moment.frame].hits[i] / 255;
     return HITS[i] ? Math.log1p(Math.expm1(before * scale) + HITS[i]) / scale : before;
   },
@@ -75,22 +74,22 @@ function layOutStage() {
   groundShown = '';
 }
 
-// Returns the space that is available for the picture, in CSS pixels. The picture is beside the controls on a wide screen, and
-// above the controls on a narrow screen. On a mobile phone the histogram of speeds is between the picture and the controls.
+// Returns the space available for the picture [CSS pixels]: beside the controls on a wide screen, above them on a narrow one. On
+// a mobile phone the histogram of speeds is between picture and controls.
 function roomOfStage() {
   if (boxSize) return boxSize;
   const full = document.fullscreenElement === $('view'), bare = getComputedStyle($('view')).display === 'contents';
   const frame = bare ? $('main') : $('view'), style = getComputedStyle(frame);
   const inner = size => parseFloat(style[size]) || 0;
   const width = frame.clientWidth - inner('paddingLeft') - inner('paddingRight');
-  // `clientHeight` is used because `innerHeight` of a mobile phone increases while the page is wider than the screen.
+  // `innerHeight` would grow on a mobile phone while the page is wider than the screen.
   const height = document.documentElement.clientHeight - (full ? 0 : $('top').offsetHeight) - inner('paddingTop') - inner('paddingBottom') - 2;
   if (cssColour('flat')) return { width: width - Math.max(260, 0.45 * width), height };
   const between = bare ? $('speeds').offsetHeight : 0;
   return { width, height: Math.max(full ? 100 : isPart ? 140 : 300, height - $('controls').offsetHeight - between - 16) };
 }
 
-// Disks that would be too small to be visible are drawn enlarged, and a note on the page tells the user that they are enlarged.
+// Disks too small to be visible are enlarged, with a note on the page.
 const leastRadius = () => clamp(0.06 * Math.sqrt(film.edges[0] * film.edges[1] / disks) * page.unit, 1.1, 3 * page.dots);
 const enlarged = () => film.radii.some(radius => radius * page.unit < leastRadius());
 
@@ -104,9 +103,8 @@ function drawStage() {
   drawMarks();
 }
 
-// Sets the line style of a side of the box or of an obstacle. The hottest thermal boundaries are drawn in the colour for hot
-// boundaries, and all other thermal boundaries in the colour for cold boundaries. Sliding boundaries are drawn with moving dashes.
-// Returns true if the boundary is thermal or slides.
+// Sets the line style of a side or an obstacle: thermal boundaries have the colour for hot if they are the hottest, otherwise the
+// colour for cold, and sliding boundaries have moving dashes. Returns true if the boundary is thermal or slides.
 const actsOn = law => !!(law && (law.temperature || law.surface_velocity));
 function drawLike(law, along = 1) {
   const dash = 7 * page.dots;
@@ -133,7 +131,7 @@ function drawGround() {
       ground.stroke(new Path2D(`M${across(a + dx)},${up(b + dy)}L${across(c + dx)},${up(d + dy)}`));
     }));
   });
-  // Periodic sides of the box are drawn as dashed lines, and open sides as dotted lines. Thermal and sliding sides are drawn with a coloured band outside the box.
+  // Periodic sides are dashed and open sides dotted. Thermal and sliding sides have a coloured band outside the box.
   copies([x0, x1], [y0, y1], (dx, dy) => {
     const left = across(x0 + dx), right = across(x1 + dx), bottom = up(y0 + dy), top = up(y1 + dy);
     [[left, bottom, left, top], [right, bottom, right, top], [left, bottom, right, bottom], [left, top, right, top]].forEach(([a, b, c, d], k) => {
@@ -152,8 +150,8 @@ function drawGround() {
   ground.setLineDash([]);
 }
 
-// Draws an obstacle. If the obstacle is smaller than a pixel, a square of the same area is drawn, because squares are drawn much
-// faster. Circles are drawn clockwise, and the positive direction of a sliding circle is counter-clockwise.
+// Draws an obstacle, or, if it is smaller than a pixel, a square of the same area, which is much faster. Circles are drawn
+// clockwise; the positive direction of a sliding circle is counter-clockwise.
 function drawObstacle([x, y, radius, inside, from, to], k) {
   const size = radius * view.unit, half = 0.886 * size;
   if (to !== undefined) { drawArc([x, y, size, from, to], k); return; }
@@ -172,8 +170,8 @@ function drawObstacle([x, y, radius, inside, from, to], k) {
   });
 }
 
-// Draws an arc between two angles [degrees], in the line style of a wall. The canvas measures angles clockwise, and the arc is
-// drawn counter-clockwise.
+// Draws an arc between two angles [degrees] in the line style of a wall. The canvas measures angles clockwise; the arc is drawn
+// counter-clockwise.
 function drawArc([x, y, size, from, to], k) {
   ground.lineWidth = (drawLike(film.laws.obstacle[k]) ? 4.5 : 1.5) * page.dots;
   const radius = size / view.unit;
@@ -184,8 +182,7 @@ function drawArc([x, y, size, from, to], k) {
   });
 }
 
-// Returns left, top, right and bottom of the visible part of the box and its periodic images
-// [pixels].
+// Returns left, top, right and bottom of the visible part of the box and its periodic images [pixels].
 function seenBox() {
   const [x0, y0] = film.lower, [width, height] = film.edges, [wrapX, wrapY] = film.periodic;
   return [wrapX ? 0 : Math.max(0, across(x0)), wrapY ? 0 : Math.max(0, up(y0 + height)),
@@ -204,13 +201,12 @@ function inBox(brush, action) {
 
 // ---------- drawing of the disks ----------
 
-// The disks are drawn pixel by pixel into an array, which is much faster than drawing thousands of arcs on the canvas. Disks of
-// different species are distinguished by stripes if the disks are large enough. Disks with pattern 0 are plain; pattern 1 has
-// horizontal stripes, pattern 2 has vertical stripes, and pattern 3 has horizontal and vertical stripes. Between the stripes of a
-// disk, the background is visible.
+// Disks are drawn pixel by pixel into an array, which is much faster than drawing thousands of arcs on the canvas. If they are
+// large enough, stripes distinguish the species: pattern 0 is plain, 1 has horizontal, 2 vertical, and 3 both horizontal and
+// vertical stripes. Between the stripes the background is visible.
 const SMALLEST_PATTERN = 3.5, PATTERNS = [0, 1, 2, 3];
 const isStriped = (kind, radius) => PATTERNS[kind % PATTERNS.length] > 0 && radius >= SMALLEST_PATTERN * page.dots;
-const bare = share => share - Math.floor(share) > 0.66;  // the last third of each period of the stripes is transparent
+const bare = share => share - Math.floor(share) > 0.66; // the last third of each period of the stripes is transparent
 
 function drawDisks() {
   const code = codesNow(state.colour), [width, height] = film.edges, wraps = film.periodic.some(Boolean);
@@ -230,7 +226,7 @@ function drawDisks() {
 
 function drawDisk(x, y, radius, colour, stripes, [left, top, right, bottom]) {
   const cx = x - 0.5, cy = y - 0.5, reach = radius + 0.5, inner = (radius - 0.5) ** 2;
-  const often = 1 / Math.max(3.5 * page.dots, 0.55 * radius);  // stripes per pixel; a stripe runs through the centre
+  const often = 1 / Math.max(3.5 * page.dots, 0.55 * radius); // stripes per pixel; a stripe runs through the centre
   const low = Math.max(top, Math.ceil(cy - reach)), high = Math.min(bottom, Math.floor(cy + reach));
   for (let j = low; j <= high; j++) {
     const between = stripes & 1 && bare((j - cy) * often + 0.33), dd = (j - cy) * (j - cy), half = Math.sqrt(Math.max(0, reach * reach - dd)), end = Math.min(right, Math.floor(cx + half));
@@ -242,9 +238,8 @@ function drawDisk(x, y, radius, colour, stripes, [left, top, right, bottom]) {
   }
 }
 
-// Returns the new colour of a pixel at the rim of a disk, which the disk covers partly. The argument `covered` is the fraction of
-// the pixel that the disk covers, expressed by a number from 0 to 255. If several disks cover parts of the pixel, their colours are
-// mixed and the covered fractions are added.
+// Returns the new colour of a pixel at the rim of a disk, which covers the fraction `covered` of it (0 to 255). If several disks
+// cover parts of the pixel, their colours are mixed and the covered fractions added.
 function painted(old, colour, covered) {
   const there = old >>> 24;
   if (there === 0) return colour & 0xffffff | covered << 24;
@@ -273,7 +268,7 @@ function drawMarks() {
   if (state.arrows) drawArrowKey();
 }
 
-// Draws the orientation of each disk as a line from the centre of the disk to its rim. In small disks no orientation line is drawn.
+// Draws the orientation of each disk as a line from its centre to its rim, except in small disks.
 const LEAST_TO_TURN = 2;
 function drawRadii() {
   marks.strokeStyle = ink.stage;
@@ -291,8 +286,7 @@ function drawRadii() {
   marks.stroke();
 }
 
-// Draws the recent path of a disk. The older part of the path is pale. Without an event log the path is approximate and therefore
-// dotted.
+// Draws the recent path of a disk, with its older part pale. Without an event log the path is approximate and therefore dotted.
 function drawTrace(i) {
   const [old, recent] = [300, 30].map(k => frameTime(moment.frame - k));
   for (const [from, to, colour, width] of [[old, recent, ink.soft, 0.9], [recent, moment.shown, ink.ink, 1.6]]) {
@@ -304,7 +298,7 @@ function drawTrace(i) {
   ring(X[i], Y[i], Math.max(radii[sizeOf[i]], 3 * page.dots) + 2 * page.dots);
 }
 
-// Draws the free flights of the disks that take part in the next event, and the positions of these disks at the event.
+// Draws the free flights of the disks that take part in the next event, and their positions at the event.
 function drawNextEvent() {
   const [when, ...both] = source.coming().next[0] ?? [], after = when - moment.time, g = film.gravity;
   marks.strokeStyle = ink.accent;
@@ -326,7 +320,7 @@ function ring(x, y, radius) {
   });
 }
 
-// Draws free flights of a disk. If a flight crosses a periodic side, it is drawn in each visible periodic image of the box.
+// Draws free flights of a disk. A flight that crosses a periodic side appears in each visible periodic image of the box.
 function drawPath(list, colour, width) {
   marks.strokeStyle = colour;
   marks.lineWidth = width * page.dots;
@@ -334,7 +328,7 @@ function drawPath(list, colour, width) {
   marks.beginPath();
   let pen = [NaN, NaN];
   for (const { from: [x0, y0], to: [x1, y1], bend: [bx, by] } of list) {
-    const x = (x0 + x1) / 2 - bx, y = (y0 + y1) / 2 - by;  // a parabola is a Bézier curve
+    const x = (x0 + x1) / 2 - bx, y = (y0 + y1) / 2 - by; // a parabola is a Bézier curve
     copies([Math.min(x0, x1, x), Math.max(x0, x1, x)], [Math.min(y0, y1, y), Math.max(y0, y1, y)], (dx, dy) => {
       const start = [across(x0 + dx), up(y0 + dy)];
       if (!(Math.hypot(start[0] - pen[0], start[1] - pen[1]) <= 0.1)) marks.moveTo(...start);
@@ -345,7 +339,7 @@ function drawPath(list, colour, width) {
   marks.stroke();
 }
 
-// The arrow for a typical speed has the same length as the mean distance between neighbouring disks.
+// The arrow for a typical speed is as long as the mean distance between neighbouring disks.
 const arrowScale = () => Math.sqrt(film.edges[0] * film.edges[1] / Math.max(10, disks)) * view.unit / arrowSpeed() / Math.sqrt(camera.zoom);
 
 function drawArrows() {
@@ -355,7 +349,7 @@ function drawArrows() {
     const vx = (VX[i] - ux) * length, vy = (uy - VY[i]) * length, size = Math.hypot(vx, vy);
     if (size < 1) continue;
     const head = Math.min(6 * page.dots, 0.5 * size) / size, reach = size / view.unit;
-    const r = radii[sizeOf[i]], hidden = r < 5 * page.dots ? Math.max(head, 1 - r / size) : 1;  // starts at the rim of a small disk
+    const r = radii[sizeOf[i]], hidden = r < 5 * page.dots ? Math.max(head, 1 - r / size) : 1; // starts at the rim of a small disk
     copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
       const x = across(X[i] + dx) + vx, y = up(Y[i] + dy) + vy;
       marks.moveTo(x - hidden * vx, y - hidden * vy);
@@ -365,7 +359,7 @@ function drawArrows() {
       marks.lineTo(x - head * (vx - 0.5 * vy), y - head * (vy + 0.5 * vx));
     });
   }
-  for (const [colour, width] of [[ink.stage, 3.2], [ink.ink, 1.4]]) {  // a light rim makes arrows visible on dark disks
+  for (const [colour, width] of [[ink.stage, 3.2], [ink.ink, 1.4]]) { // a light rim makes arrows visible on dark disks
     marks.strokeStyle = colour;
     marks.lineWidth = width * page.dots;
     marks.lineCap = marks.lineJoin = 'round';
@@ -373,7 +367,7 @@ function drawArrows() {
   }
 }
 
-// Draws a reference arrow in the upper left corner, and beside the arrow the speed that corresponds to its length.
+// Draws a reference arrow in the upper left corner, labelled with the speed that it represents.
 function drawArrowKey() {
   const speed = +arrowSpeed().toPrecision(1), size = speed * arrowScale(), { dots } = page, words = `speed ${short(speed)}`;
   marks.font = `${12 * dots}px system-ui, sans-serif`;
@@ -385,7 +379,7 @@ function drawArrowKey() {
   marks.fillText(words, x + 6 * dots, y);
 }
 
-// Draws the number of each disk inside the disk, or beside the disk if the disk is too small.
+// Draws the number of each disk inside it or, if it is too small, beside it.
 function drawNumbers() {
   const code = codesNow(state.colour), least = 7 * page.dots;
   marks.textAlign = 'center';

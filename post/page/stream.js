@@ -1,10 +1,11 @@
 // ---------- laboratory (interactive page): film of a running simulation, whose frames a worker process sends ----------
 
-// The page draws the newest frame. Earlier frames are kept, so that the user can go back to them. If the frames need too much
-// memory, every second frame of their older half is removed. If the user goes back and plays the film, the page first shows the
-// kept frames, and then new frames of the worker process.
-const PAST_ROOM = 6e7, HEAD = 7, MOST_CURVE = 3000;  // memory for frames [bytes]; numbers before the positions of a message; samples of a plot
-const SAME_TIME = 1e-13;  // largest relative difference of two times of one moment
+// The page draws the newest frame, and keeps earlier frames so that the user can go back. If they need too much memory, every
+// second frame in their older half is removed. When the user goes back and plays the film, the page first shows the kept frames
+// and then new frames from the worker process.
+// memory for frames [bytes]; numbers before the positions in a message; samples in a plot
+const PAST_ROOM = 6e7, HEAD = 7, MOST_CURVE = 3000;
+const SAME_TIME = 1e-13; // largest relative difference of two times that count as equal
 const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
@@ -21,7 +22,7 @@ function talk(wish, heard) {
 function starts(on) { document.documentElement.classList.toggle('starting', on); }
 function isStarting() { return document.documentElement.classList.contains('starting'); }
 
-// Starts the run that the user of the laboratory requests. All runs of this film use the same connection to a worker process.
+// Starts the run requested by the user of the laboratory. All runs of this film share a connection to one worker process.
 function start(run) {
   const same = stream.wish?.input === run.input, wish = { do: 'start', ...run, pace: same ? stream.sent : null, playing: !parent.isPaused() && !parent.isComparing() };
   if (!same) [stream.sent, usual] = [0, usual || !!stream.wish];
@@ -34,7 +35,7 @@ function start(run) {
   });
 }
 
-// Stops the worker process if the placement of disks takes too long. The next run is then performed by a new worker process.
+// Stops the worker process if placing the disks takes too long. A new worker process then executes the next run.
 function leave() { stream.socket?.leave(); }
 
 const hear = {
@@ -49,11 +50,11 @@ const hear = {
       refresh();
       return;
     }
-    stream.scene = { facts, blocks, run };  // the new scene is shown together with its first frame
+    stream.scene = { facts, blocks, run }; // the new scene is shown together with its first frame
   },
   numbers(news) {
     const { curves } = stream, { time } = news;
-    if (time <= curves.time.at(-1)) {  // a change at this time
+    if (time <= curves.time.at(-1)) { // a change at this time
       curves.news[curves.news.length - 1] = news;
       return;
     }
@@ -76,15 +77,15 @@ const hear = {
   },
   state({ playing, ended, reason, changes }) {
     if (film && changes) film.changes = changes.map(([time, name, value]) => [time, name ? `${name} = ${value}` : value]);
-    if (isStarting()) return;  // the message belongs to the previous run
-    if (reason && past.length && !state.playing) show(moment.time, true);  // a refused disk returns to its place
+    if (isStarting()) return; // the message belongs to the previous run
+    if (reason && past.length && !state.playing) show(moment.time, true); // a refused disk returns to its place
     stream.ended = ended;
     if (!playing && state.playing && stream.live && past.length && !parent.isComparing()) play(false);
   },
   problems({ change }) {
-    if (change) return;  // a refused change belongs to the previous run
+    if (change) return; // a refused change belongs to the previous run
     starts(false);
-    if (past.length && !state.playing) show(moment.time, true);  // a refused disk or arrow returns to its place
+    if (past.length && !state.playing) show(moment.time, true); // a refused disk or arrow returns to its place
   },
   gone() { starts(false); stream.ended = true; },
 };
@@ -99,7 +100,7 @@ function open({ facts, blocks, run }) {
   source = fromWorker;
 }
 
-// Adapts the scale of speeds when the disks have become much faster or slower, or when resting disks begin to move.
+// Adapts the scale of speeds after the disks have become much faster or slower, or when resting disks begin to move.
 function fitScales(mean) {
   const [, top] = film.scales.speed, rest = VX.filter((vx, i) => vx === 0 && VY[i] === 0).length / (sumOf(moment.inside) || 1);
   if ((rest > RESTING && rest < 1) === film.speeds.rest && !(mean > 0.8 * top) && !(mean && mean < 0.1 * top && !film.speeds.rest)) return;
@@ -124,7 +125,7 @@ function take(buffer) {
   // The interval between two frames is so short that no disk moves farther than half of the box.
   cross(frame, ({ place }, k) => film.periodic[k % 2] ? Math.round((place[k] - frame.place[k]) / film.edges[k % 2]) : 0);
   const isFirst = !past.length, follows = stream.live && moment.time === past.at(-1)?.time;
-  // At a start the same time occurs again; a change acts at a time that is later by a rounding error only.
+  // At a start the same time occurs again; a change acts at a time that is later by only a rounding error.
   if (frame.time - past.at(-1)?.time <= SAME_TIME * Math.abs(frame.time)) past.pop();
   past.push(frame);
   if (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past = past.filter((_, k) => k % 2 === 0 || 2 * k > past.length);
@@ -134,11 +135,11 @@ function take(buffer) {
     document.documentElement.classList.remove('empty');
     origins = frame.place;
     const squares = Array.from({ length: disks }, (_, i) => frame.velocity[2 * i] ** 2 + frame.velocity[2 * i + 1] ** 2).filter(Boolean);
-    setTop(1.5 * Math.sqrt(2 * squares.reduce((sum, one) => sum + one, 0) / squares.length) || 1);  // mean over the moving disks
+    setTop(1.5 * Math.sqrt(2 * squares.reduce((sum, one) => sum + one, 0) / squares.length) || 1); // mean over the moving disks
     move(frame.time);
     begin();
     refresh();
-    if (opens) parent.arrangeAll();  // the controls and the plots move from the previous film to this one
+    if (opens) parent.arrangeAll(); // controls and plots move from the previous film to this one
     play(!parent.isPaused());
   } else if (!state.playing && follows) {
     show(frame.time, true);
@@ -147,8 +148,8 @@ function take(buffer) {
   if (!state.playing) drawn();
 }
 
-// The page confirms the received frames whenever it draws a picture, and at once while the film is paused. The worker process waits
-// for confirmations, and is at most two frames ahead of the page.
+// The page confirms frames whenever it draws a picture, and at once while the film is paused. The worker process waits for
+// confirmations, and is at most two frames ahead of the page.
 function drawn() { for (; stream.fresh > 0; stream.fresh--) send({ do: 'got' }); }
 
 const fromWorker = {
@@ -168,8 +169,8 @@ const fromWorker = {
     stream.live = moment.time === last();
     if (stream.live && !parent.isComparing()) send({ do: 'play' });
   },
-  // The newest frame is shown. Frames that the pause keeps from being drawn are confirmed, too, because the worker process would
-  // otherwise wait for them and ignore the next step.
+  // Shows the newest frame. Frames not drawn because of the pause are confirmed, too, because the worker process would otherwise
+  // wait for them and ignore the next step.
   rest() {
     send({ do: 'pause' });
     if (stream.live && !parent.isComparing()) show(last(), true);
@@ -187,7 +188,7 @@ const fromWorker = {
   newest(next) {
     const { fresh } = stream;
     drawn();
-    if (parent.conducts(window)) return;  // compared runs show the same time
+    if (parent.conducts(window)) return; // compared runs show the same time
     if (stream.live) {
       if (fresh) show(last());
     } else {
@@ -201,18 +202,16 @@ const fromWorker = {
 
 // ---------- film as a part of the laboratory ----------
 
-// These functions are called by the laboratory for each of its films.
+// Called by the laboratory for each of its films.
 function inside() { return { film, source, state, moment, kinds, stream, overlaid, past, encounter, numbersNow, speedsOfFilm }; }
 
 // Converts a position in the box to a position on the page [CSS pixels].
 function pixelOf(x, y) { return [across(x) / page.dots, up(y) / page.dots]; }
 
-// Returns whether the film can show a given time; if the run has ended, its last frame is shown at
-// all later times.
+// Returns whether the film can show a given time. After the end of the run, its last frame is shown at all later times.
 function hasReached(time) { return past.length > 0 && !isStarting() && (last() >= time || stream.ended); }
 
-// Continues the film after the page has changed from one film to several films, or from several
-// films to one.
+// Continues the film after the page has changed from one film to several, or from several to one.
 function resume() { if (state.playing) source.begins(); }
 
 function reach(time) {
@@ -221,7 +220,7 @@ function reach(time) {
   send({ do: 'reach', time });
 }
 
-// Shows the same time as another film; this function is called while the films are paused.
+// Shows the same time as another film, while the films are paused.
 function join(time) {
   if (!past.length) return;
   show(Math.min(time, last()), true);
@@ -232,8 +231,8 @@ function join(time) {
 // Returns whether the film has a frame at a given time, or can still compute one.
 function canShow(time) { return !(past.at(-1)?.time >= time) || past[frameAt(time)].time === time; }
 
-// Returns the time of the last frame between two times whose time satisfies a condition or, if there is no such frame, the time of
-// the first later frame that satisfies the condition. The result is null if no frame after the first time satisfies the condition.
+// Returns the time of the last frame between two times that satisfies a condition or, if there is none, of the first later frame
+// that does; null if no frame after the first time does.
 function frameBetween(from, to, condition) {
   let found = null;
   for (const { time } of past.slice(frameAt(from) + 1)) {
@@ -260,7 +259,7 @@ function choices(wish) {
   return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total, momenta, centred }, scale: { input, speed, mass } };
 }
 
-// When another run starts beside the run of this film, this film plays again from its first stored frame.
+// Plays this film again from its first stored frame when another run starts beside it.
 function replay() {
   if (!film) return;
   show(first(), true);
@@ -269,9 +268,9 @@ function replay() {
   play(true);
 }
 
-// Shows the film beside other films, with a picture of the given size and distance from the left side of the page. If no `size` is
-// given, the film fills the whole page. A film that is `bare` has neither controls nor plots.
-let boxSize = null;  // { left, width, height } [CSS pixels]
+// Shows the film beside others, with a picture of the given size and distance from the left edge of the page, or on the whole
+// page if `size` is missing. A `bare` film has neither controls nor plots.
+let boxSize = null; // { left, width, height } [CSS pixels]
 function arrange(size, bare) {
   boxSize = size;
   document.documentElement.classList.toggle('boxed', !!size);
@@ -279,7 +278,7 @@ function arrange(size, bare) {
   layout();
 }
 
-// Plots the measured values of a scan with error bars against the input variable that is scanned.
+// Plots the measured values of a scan with error bars against the scanned variable.
 function plotScan(canvas, { log, points, values }) {
   const scaled = value => log ? Math.log10(value) : value, ends = points.flatMap(([, mean, error]) => [mean - error, mean + error]);
   Object.assign(canvas, { width: canvas.clientWidth * page.dots, height: canvas.clientHeight * page.dots });

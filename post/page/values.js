@@ -8,14 +8,14 @@ const givenAs = key => givenIn(placeOf(key))[nameOf(key)] ?? '';
 const textOf = key => state.settings[key] ?? givenAs(key);
 
 const isVariable = key => key?.includes('.') && !!lab.table[key.split('.')[0]]?.[nameOf(key)];
-// Returns the text given for a variable or, without such a text, its default. The default can be the value of another variable.
+// Returns the text given for a variable or, if there is none, its default, which may be the value of another variable.
 const actingOf = key => textOf(key) || defaultOf(key);
 function defaultOf(key) {
   const { default: usual, otherwise } = variableOf(key);
   return isVariable(otherwise) ? actingOf(otherwise) : words(usual);
 }
 
-// Returns the default of a variable as text, or words that say what happens without a value.
+// Returns the default of a variable as text, or words that describe what happens without a value.
 function defaultInWords(key) {
   const { otherwise } = variableOf(key);
   return defaultOf(key) || (isVariable(otherwise) ? defaultInWords(otherwise) : otherwise ?? '');
