@@ -3,17 +3,18 @@
 # Benchmarks: cost of collisions, of the start of a run and of the output. docs/explanation/performance.md explains the results.
 #
 # A rate is the number of collisions, in millions, per second of processor time, measured on one core in runs that also sample
-# observables; the printed rate is the median of RUNS=5 runs. Before each measurement, the system is simulated until it has lost the
-# memory of its initial state. No other program should run meanwhile. The environment variable RICOCHET names the measured program
-# (default build/ricochet). --check requires a program compiled without AVX-512 instructions, which valgrind cannot execute.
+# observables; the printed rate is the median of RUNS=5 runs. Before each measurement, the system is simulated until it is
+# independent of its initial state. No other program should run meanwhile. The environment variable RICOCHET names the measured
+# program (default build/ricochet). --check requires a program compiled without AVX-512 instructions, which valgrind cannot
+# execute.
 #
-# Examples of calls:
+# Examples:
 #
 #   runs/bench.sh            measures 1e3 to 1e5 disks at four packing fractions, also with gravity and other features
 #   runs/bench.sh --full     also measures 1e6 disks, the random start, the memory, and runs on two cores
 #   runs/bench.sh --check    compares the numbers of instructions per collision with their limits (requires valgrind)
 set -euo pipefail
-export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
+export LC_ALL=C # so that awk reads and writes 0.5 with a point in every language
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 
 program=$(realpath "${RICOCHET:-build/ricochet}")
@@ -26,7 +27,7 @@ if command -v taskset >/dev/null; then one_core=(taskset -c $(($(nproc) - 1))); 
 
 # --- Preparation of starting states, and single runs -----------------------------------------------
 
-# input FILE START SPECIES...: writes an input file. START contains the variables that define the initial state of each species.
+# input FILE START SPECIES...: writes an input file, in which the variables START define the initial state of each species.
 input() {
   local file=$1 start=$2 species
   shift 2
@@ -34,8 +35,8 @@ input() {
 }
 
 # state NAME SPECIES...: simulates the disks SPECIES for 20 collisions per disk, and writes the input file $work/NAME.nml, which
-# starts from the last frame. Initial positions are random or, at packing fractions too high for random insertion, on a lattice,
-# which does not melt within these 20 collisions per disk if it has 1e5 disks or more.
+# starts from the last frame. Initial positions are random or, at packing fractions too high for random insertion, on a lattice. A
+# lattice of 1e5 disks or more does not melt within these 20 collisions per disk.
 state() {
   local name=$1 placement=random
   shift
@@ -57,7 +58,7 @@ polydisperse() {
   state "$1_$2_$3" "name = 'gas', count = $2, packing_fraction = $3, polydispersity = $spread, radius_distribution = '$1', mass_scaling = 'area'"
 }
 
-# run NAME COLLISIONS [OPTION...]: performs one run that begins from the starting state NAME.
+# run NAME COLLISIONS [OPTION...]: executes a run that starts from the state NAME.
 run() {
   local name=$1 collisions=$2
   shift 2
@@ -76,7 +77,7 @@ repeated() { local k; for ((k = 0; k < repeats; k++)); do "$@"; done; }
 
 # --- Rates for several numbers of disks and packing fractions -------------------------------------------------------------------
 
-samples() { echo "output.observables_every_collisions=$((5 * $1))"; }      # for this number of disks
+samples() { echo "output.observables_every_collisions=$((5 * $1))"; } # for this number of disks
 
 table() {
   local packing disks sizes=(1000 10000 100000)
@@ -96,9 +97,8 @@ table() {
 
 # --- Rates with and without an additional option, measured alternately ------------------------------------
 
-# beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: measures the rate of a run without options that begins from the starting
-# state NAME, and the rate of a run with the options that begins from the starting state OTHER. The function prints the two rates,
-# and the ratio of the rate with options to the rate without options.
+# beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: measures the rate of a run from the state NAME without options, and of a
+# run from the state OTHER with the options. Prints both rates, and the ratio of the second to the first.
 beside() {
   local what=$1 least=$2 name=$3 other=$4 collisions=$5 k
   shift 5
@@ -136,7 +136,7 @@ costs() {
   beside '1e5 disks, packing 0.45: a disk of 100 radii' 0.90 gas_100000_0.45 brownian 6000000
 }
 
-# The mixture has five species with the radii 1, 1.1, ... 1.4 and a total packing fraction of 0.5.
+# The mixture has five species with the radii 1, 1.1, ..., 1.4 and a total packing fraction of 0.5.
 sizes=()
 for tenths in 10 11 12 13 14; do
   sizes+=("name = 'r$tenths', count = 2000, packing_fraction = $(awk -v r=$tenths 'BEGIN { print r*r/1460 }')")
@@ -144,7 +144,7 @@ done
 
 # --- Time and memory of complete processes -----------------------------------------------------------
 
-# process COMMAND...: prints the processor time in seconds, and the memory in bytes, that the command uses.
+# process COMMAND...: prints the processor time [s] and the memory [bytes] that the command uses.
 process() {
   python3 -c 'import os, sys
 child = os.spawnvp(os.P_NOWAIT, sys.argv[1], sys.argv[1:])
@@ -153,7 +153,7 @@ print("used", use.ru_utime + use.ru_stime, 1024*use.ru_maxrss)
 sys.exit(status != 0)' "$@" | awk '$1 == "used" { print $2, $3 }'
 }
 
-# seconds COMMAND...: prints the wall time of the command in seconds.
+# seconds COMMAND...: prints the wall time of the command [s].
 seconds() {
   local TIMEFORMAT=%R
   { time "$@" >/dev/null 2>&3; } 3>&2 2>&1
@@ -178,7 +178,7 @@ processes() {
   printf '%-52s%8.2f times as fast, at least 1.9\n' 'four runs on two cores' "$(awk -v one="$one" -v two="$two" 'BEGIN { print one/two }')"
 }
 
-# faster WHAT LEAST NAME COLLISIONS [OPTION...]: prints the ratio of the wall times of complete runs with one and with two threads.
+# faster WHAT LEAST NAME COLLISIONS [OPTION...]: prints the wall time of complete runs with one thread over that with two.
 faster() {
   local what=$1 least=$2 k threads
   shift 2
@@ -207,7 +207,7 @@ threads() {
   faster 'gravity, 100000 disks, packing 0.5' 1.6 gas_100000_0.5 6000000 --set box.gravity=0,-1
 }
 
-# ensemble JOBS: performs four runs of several seconds each, of which JOBS runs are performed at the same time.
+# ensemble JOBS: executes four runs of several seconds each, JOBS of them at a time.
 ensemble() {
   RICOCHET=$program runs/ensemble.sh "$work/gas_10000_0.5.nml" -d "$work/ensemble$1" --seeds 1-4 -j "$1" \
     --set stop.collisions=20000000
@@ -216,7 +216,7 @@ ensemble() {
 # --- Numbers of instructions, compared with their limits ----------------------------------------------
 
 # instructions RADII PACKING COLLISIONS [OPTION...]: counts the instructions in the event loop and at the start of epochs (periods
-# between two shifts of the time origin). Instructions in other parts of a run (start, output) are not counted, because their number
+# between two shifts of the time origin). Other parts of a run (start, output) do not count, because their number of instructions
 # depends on the time of day. The runs have 1000 equal disks, or 4000 disks with many different radii.
 instructions() {
   local radii=$1 packing=$2 collisions=$3 name
@@ -231,8 +231,7 @@ instructions() {
   counted run "$name" "$collisions" "$@"
 }
 
-# counted COMMAND...: executes COMMAND, which runs the simulation program under valgrind, and prints the number of counted
-# instructions.
+# counted COMMAND...: executes COMMAND, which runs the simulation program under valgrind, and prints the number of instructions.
 counted() {
   run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
   run_by+=(--toggle-collect=__{event_driven_MOD_{advance,start,renew},epochs_MOD_move_epoch,kicks_MOD_kick}'*')
@@ -240,8 +239,8 @@ counted() {
   awk '/Collected/ { print $4 }' "$work/count"
 }
 
-# obstacles NAME: writes the input file $work/NAME.nml with one disk among 1225 circular obstacles. Depending on NAME, the obstacles
-# are randomly placed with a density of one per unit of area, form the regular pattern of a pegboard, or form a Lorentz gas.
+# obstacles NAME: writes the input file $work/NAME.nml with one disk among 1225 circular obstacles: randomly placed, one per unit
+# of area; in the regular pattern of a pegboard; or as a Lorentz gas.
 obstacles() {
   local file=$work/$1.nml kind=${1%_*} number=${1#*_}
   case $kind in
@@ -266,16 +265,16 @@ events() {
   "${run_by[@]}" "$program" "$work/$1.nml" -o "$work/bench.h5" --force --quiet --set "stop.events=$2"
 }
 
-# piston DISKS: writes the input file $work/piston_DISKS.nml of a gas at a packing fraction of 0.2. The gas is in mechanical
-# equilibrium with a piston, whose mass is a tenth of the mass of the gas.
+# piston DISKS: writes the input file $work/piston_DISKS.nml of a gas at a packing fraction of 0.2, in mechanical equilibrium with
+# a piston that has a tenth of the mass of the gas.
 piston() {
   gas "$1" 0.2
   { echo "&side name = 'right' motion = 'piston' mass = $(($1/10)) force = $((3*$1/2)) /" && cat "$work/gas_$1_0.2.nml"; } \
     >"$work/piston_$1.nml"
 }
 
-# kicked NUMBER: simulates a gas of 1000 disks in a periodic box with a thermostat. The thermostat changes all velocities NUMBER
-# times; the interval between these changes is a tenth of the mean free time of a disk.
+# kicked NUMBER: simulates a gas of 1000 disks in a periodic box with a thermostat that changes all velocities NUMBER times, at
+# intervals of a tenth of the mean free time.
 kicked() {
   local interval=8.5e-4
   "${run_by[@]}" "$program" "$work/gas_1000_0.3.nml" -o "$work/bench.h5" --force --quiet --set box.boundary=periodic,periodic \

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 
-# Lab, task 4: circular walls and unequal disks: paths in the Sinai and Lorentz billiards, divergence of initially close paths, a
-# round container, and Brownian motion.
+# Lab, task 4, on circular walls and unequal disks: paths in the Sinai and Lorentz billiards, divergence of paths that start close
+# together, a round container, and Brownian motion.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 for name in sinai lorentz container; do

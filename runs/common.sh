@@ -1,15 +1,14 @@
 # shellcheck shell=bash
 
-# Definitions shared by all scripts of this folder that simulate a system and source this file: the variables `python` (Python
-# interpreter), `data` (folder of output files) and `figures` (folder of figures), and the function `replace`. Options such as -j 4
-# are passed on to ensemble.sh.
+# Shared by the scripts in this folder that simulate a system: the variables `python` (Python interpreter), `data` (folder of
+# output files) and `figures` (folder of figures), and the function `replace`. Options such as -j 4 are passed on to ensemble.sh.
 set -euo pipefail
 if [[ " $* " == *' -h '* || " $* " == *' --help '* ]]; then
   sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"
   printf 'The figures are written to runs/figures; options are passed to ensemble.sh, for example -j 4.\n'
   exit 0
 fi
-export LC_ALL=C # awk then writes 0.5 with a point in every language
+export LC_ALL=C # so that awk writes 0.5 with a point in every language
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 python=${PYTHON:-.venv/bin/python} data=runs/$(basename -- "$0" .sh) figures=runs/figures
 command -v "$python" >/dev/null || {

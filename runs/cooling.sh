@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 
-# Exam, problem 4: kinetic energies of a mixture with coefficients of restitution 1, 0.9 and 0.8, with elastic or inelastic walls;
-# eight seeds each.
+# Exam, problem 4: kinetic energies of a mixture with coefficients of restitution 1, 0.9 and 0.8, and with elastic or inelastic
+# walls; eight seeds each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 runs/ensemble.sh input/cooling.nml -d "$data" --scan contact.wall_rule=velocity,normal \

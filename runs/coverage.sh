@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 
-# Coverage of the error bars: the fraction that contains the true value, from 200 short runs each of a gas, of a liquid, and of a
-# liquid near freezing.
+# Coverage of the error bars, the fraction of them that contain the true value, from 200 short runs each of a gas, of a liquid,
+# and of a liquid near freezing.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 while read -r packing placement; do

@@ -4,9 +4,9 @@
 # restitution.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Each parameter is varied over ten values, with eight beds (seeds) for each value, while the other three keep their standard
-# values: mass 25, speed 5, radius 5 and restitution 0.5. Hard disks have no energy scale, so the crater does not depend on the
-# speed. A constant contact time (TC model) would introduce such a scale; it is therefore proportional to 1/speed.
+# Each parameter is varied over ten values, with eight beds (seeds) for each, while the other three keep their standard values:
+# mass 25, speed 5, radius 5 and restitution 0.5. Since hard disks have no energy scale, the crater does not depend on the speed.
+# A constant contact time (TC model) would introduce such a scale, so it is chosen proportional to 1/speed.
 member() { # mass speed radius restitution seed
   local contact_time
   contact_time=$(awk -v v="$2" 'BEGIN { printf "%.17g", 5e-5 / v }')

@@ -13,7 +13,7 @@ done
   -o "$figures/couette.png" --csv "$figures/couette.csv"
 "$python" post/rough.py "$data"/rough/*.h5 -o "$figures/rough.png" --csv "$figures/rough.csv"
 
-# For viscosity, conductivity and diffusion, frames are several mean free times apart at each packing fraction.
+# At each packing fraction, frames are several mean free times apart, for viscosity, conductivity and diffusion.
 transport=()
 while read -r packing interval samples placement; do
   runs/ensemble.sh input/bulk.nml -d "$data/transport_$packing" --seeds 1-4 \
@@ -32,8 +32,7 @@ TABLE
 "$python" post/transport.py "${transport[@]}" -o "$figures/transport.png" \
   --csv "$figures/transport.csv"
 
-# Arguments: the system, the quantity on the vertical axis, the name of the run for the film, and options of ensemble.sh that define
-# the runs.
+# Columns: system, quantity on the vertical axis, run for the film, and the options of ensemble.sh that define the runs.
 while read -r system show film scan; do
   runs/ensemble.sh "input/$system.nml" -d "$data/$system" --seeds 1-4 ${scan:+--scan "$scan"} "$@"
   "$python" post/driven.py "$data/$system"/*.h5 --show "$show" -o "$figures/$system.png" \

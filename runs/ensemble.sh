@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 
-# Performs the member runs of a sweep on all cores: one for each combination of seeds and values of variables. After an
+# Executes the member runs of a sweep on all cores: one for each combination of seeds and values of variables. After an
 # interruption, the same command continues the sweep.
 set -euo pipefail
 me=${0##*/}
 ((BASH_VERSINFO[0]*100 + BASH_VERSINFO[1] >= 404)) || { echo "bash 4.4 or newer is needed, this is $BASH_VERSION" >&2; exit 2; }
-export OMP_NUM_THREADS=1 # default of one core for each member; run.threads has priority
+export OMP_NUM_THREADS=1 # one core per member run, unless run.threads is set
 
 usage() {
   cat <<TEXT
@@ -60,21 +60,21 @@ fail() {
 
 die() { fail 2 "$@"; }
 
-# nearest WORD CHOICE...: prints a suggestion such as "; did you mean --seeds?" if WORD is similar to one of the choices. Without
-# Python, this function prints nothing.
+# nearest WORD CHOICE...: prints a suggestion such as "; did you mean --seeds?" if WORD resembles one of the choices, or nothing
+# without Python.
 nearest() {
   python3 -c 'import difflib, sys
 for near in difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1): print(f"; did you mean {near}?")' \
     "$@" 2>/dev/null || true
 }
 
-# --- member runs: two arrays contain their names and their overrides ("--set A=B --set C=D") ---
+# --- member runs: two arrays hold their names and their overrides ("--set A=B --set C=D") ---
 
 most=100000
 names=()
 overrides=()
 
-# Adds the seeds to the scanned variables; for example, the argument 1-4,11 adds run.seed=1,2,3,4,11.
+# Adds the seeds to the scanned variables; the argument 1-4,11, for example, adds run.seed=1,2,3,4,11.
 scan_seeds() {
   local part first last parts list=()
   mapfile -t -d , parts < <(printf '%s,' "$1")
@@ -92,9 +92,9 @@ scan_seeds() {
   scans+=("run.seed=${list%,}")
 }
 
-# Adds a member run for every combination of the values of the scanned variables and the seeds. The first scanned variable varies
-# slowest. The name of a member run contains the values of the scanned variables, without blanks and slashes. For example, the name
-# is ball.mass_5 for species.ball.mass=5, and gravity_2_-5 for box.gravity(2)=-5.
+# Adds a member run for every combination of values of the scanned variables and seeds, with the first scanned variable varying
+# slowest. The name of a member run consists of the values of the scanned variables, without blanks and slashes: ball.mass_5
+# stands for species.ball.mass=5, and gravity_2_-5 for box.gravity(2)=-5.
 generate_members() {
   local scan variable list values separator value k short old_names old_overrides known=' '
   names=("") overrides=("")
@@ -120,7 +120,7 @@ generate_members() {
   done
 }
 
-# Reads the names and the overrides (options --set) of the member runs from standard input, in the format of a manifest.
+# Reads the names and the overrides (options --set) of member runs from standard input, in the format of a manifest.
 read_manifest() {
   local line rest
   while IFS= read -r line || [[ -n $line ]]; do
@@ -157,9 +157,9 @@ check_names() {
   done
 }
 
-# --- worker processes, which perform the member runs ---
+# --- worker processes, which execute the member runs ---
 
-# Appends the overrides of a member run to the array `arguments`. A value in quotes may contain the text ' --set '.
+# Appends the overrides of a member run to the array `arguments`. A quoted value may contain the text ' --set '.
 add_overrides() {
   local rest=$1 pair quotes more
   while [[ $rest == '--set '* ]]; do
@@ -177,30 +177,30 @@ add_overrides() {
   done
 }
 
-# Performs the member run k, and reports the result to the parent process through the pipe.
+# Executes the member run k, and reports the result to the parent process through the pipe.
 run_member() {
   local base=$folder/${names[$1]} status resume='' said
   said=$(last_words "${names[$1]}")
   local arguments=("$input" -o "$base.h5" --quiet)
   add_overrides "${overrides[$1]}"
-  [[ -z $said ]] || echo >&"$lock" # from an earlier attempt
+  [[ -z $said ]] || echo >&"$lock" # separates this attempt from an earlier one
   [[ ! -e $base.h5.part && ! -e $base.h5 ]] || resume=--resume
   while :; do
     "$program" "${arguments[@]}" $resume >"/dev/fd/$lock" 2>&1 </dev/null {events}>&- &
     child=$!
-    [[ -z $stopping ]] || kill -TERM "$child" 2>/dev/null || true # the signal came before
-    while :; do # `wait` also ends when a signal comes
+    [[ -z $stopping ]] || kill -TERM "$child" 2>/dev/null || true # the signal arrived earlier
+    while :; do # `wait` also ends when a signal arrives
       interrupted='' status=0
-      wait "$child" 2>/dev/null || status=$? # suppresses bash's message about a killed process
+      wait "$child" 2>/dev/null || status=$? # without bash's message about a killed process
       [[ -n $interrupted && ($status == 143 || $status == 130) ]] || break
     done
     child=
     [[ -n $resume && $(last_words "${names[$1]}") == *": its run broke off "* ]] || break
-    resume= # the member starts from the beginning
+    resume= # start again from the beginning
   done
-  # While the script is being stopped, a member run with a negative exit status, or with an exit status of at least 127, is regarded
-  # as stopped, too. Such a member run was stopped either during its start, or while bash waited for the member run a second time.
-  # An exit status of -1 means that bash has lost the exit status of the member run.
+  # While the script is being stopped, a member run with a negative exit status, or one of at least 127, counts as stopped, too:
+  # it was stopped during its start, or while bash waited for it a second time. The exit status -1 means that bash has lost the
+  # exit status.
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
   if ((status == 3)) && [[ -e $base.h5 && $(last_words "${names[$1]}") == *"$is_finished"* ]]; then
     touch -- "$base.h5" && status=0
@@ -209,8 +209,8 @@ run_member() {
   printf '%s %s\n' "$1" "$status" >&"$events"
 }
 
-# Reports that a member run was killed. The arguments are the exit status and the message about earlier attempts. If a member run
-# has been killed three times, it is not started again, because it probably needs more memory or time.
+# Reports that a member run was killed, given its exit status and the message about earlier attempts. After three such ends it is
+# not started again, because it probably needs more memory or time.
 tell_kill() {
   local how='' given_up=''
   [[ $1 != 137 ]] || how=' (out of memory?)'
@@ -219,8 +219,8 @@ tell_kill() {
   printf '%skilled by signal %d%s, %(%FT%T%z)T on %s\n' "$given_up" "$(($1 - 128))" "$how" -1 "$host"
 }
 
-# Performs all member runs that no other worker process and no other copy of this script performs. Each member run is reserved by a
-# lock on its log file. The simulation program inherits the lock; therefore the lock exists as long as the program runs.
+# Executes all member runs that no other worker process, and no other call of this script, executes. A member run is reserved by a
+# lock on its log file. The simulation program inherits the lock, which therefore exists as long as the program runs.
 work() {
   local k base lock child='' stopping='' interrupted=''
   trap 'stopping=1 interrupted=1; [[ -z $child ]] || kill -TERM "$child" 2>/dev/null || true' TERM INT
@@ -257,8 +257,8 @@ clock() {
   fi
 }
 
-# tell MEMBER TEXT: prints a line about a member run if this script performs only a share of the member runs. The line contains the
-# name of the member run, the time and the host, because each share may be performed on another computer or at another time.
+# tell MEMBER TEXT: prints a line about a member run, with its name, the time and the host, if this script executes only a share
+# of the member runs. Each share may be executed on another computer or at another time.
 tell() {
   [[ -z $task ]] || printf '%(%FT%T%z)T %s %s %s: %s\n' -1 "$task" "$host" "$1" "$2" >&2
 }
@@ -288,12 +288,12 @@ run_all() {
   mkfifo "$claims/pipe"
   exec {events}<>"$claims/pipe"
   trap forward TERM INT HUP
-  set -m # separate process groups: Ctrl-C reaches this script only, which sends one TERM to each member
+  set -m # separate process groups: Ctrl-C reaches only this script, which sends one TERM to each member run
   for ((slot = 0; slot < jobs && slot < total; slot++)); do
     [[ -z $stopped ]] || break
     work &
     workers+=($!)
-    [[ -z $stopped ]] || forward # the signal came before
+    [[ -z $stopped ]] || forward # the signal arrived earlier
   done
   set +m
   while ((ended < ${#workers[@]})); do
@@ -331,8 +331,8 @@ failure() {
   tell "$1" "failed$2: ${3:-no message in its log}"
 }
 
-# announce TEXT: prints TEXT, followed by a summary of all member runs. If the script performs only a share of the member runs, it
-# prints no summary, because a line has already been printed for each member run.
+# announce TEXT: prints TEXT with a summary of all member runs, unless the script executes only a share of them, for each of which
+# a line has been printed already.
 announce() {
   [[ -z $share ]] || return 0
   printf '%s: %s%d of %d members finished' "$folder" "$1" "$finished" "$total" >&2
@@ -354,9 +354,8 @@ summarise() {
 
 # --- engines (GNU parallel, Slurm): they start this script several times, each time for a share of the member runs ---
 
-# Sets two variables. `shares` is the number M of shares into which the member runs are divided; the argument of the function is the
-# largest allowed value of M. `share_command` is the command that performs share K of M if the text K/M is appended to the command.
-# Finished and failed member runs do not belong to any share.
+# Sets `shares`, the number M of shares into which the member runs are divided (at most the argument), and `share_command`, which
+# executes share K of M when K/M is appended. Finished and failed member runs belong to no share.
 prepare_shares() {
   local most=$1 k here left=0
   here=$(cd -- "$folder" && pwd)
@@ -369,7 +368,7 @@ prepare_shares() {
     --manifest "$here/left.txt" -j 1 --share)
 }
 
-# Determines from the output files and log files which member runs have failed.
+# Determines from output files and log files which member runs have failed.
 judge_by_files() {
   local name last_line
   for name in "${names[@]}"; do
@@ -379,8 +378,8 @@ judge_by_files() {
   done
 }
 
-# The signal TERM must be delivered to the script itself, and not to a shell that runs the script. A shell that runs the script
-# would terminate at once, and GNU parallel would treat the share as finished although the script continues.
+# TERM must be delivered to the script itself. A shell that runs the script would terminate at once, and GNU parallel would treat
+# the share as finished while the script continues.
 run_parallel() {
   local options=(--will-cite -j "$jobs" --termseq 'TERM,600000') child=''
   command -v parallel >/dev/null || die "--engine parallel needs GNU parallel (package parallel)"
@@ -392,14 +391,14 @@ run_parallel() {
   trap 'stopped=1; [[ -z $child ]] || kill -TERM "$child" 2>/dev/null || true' TERM INT HUP
   parallel "${options[@]}" "exec $(printf '%q ' "${share_command[@]}"){}/$shares" < <(seq "$shares") 2>"$folder/parallel.log" &
   child=$!
-  [[ -z $stopped ]] || kill -TERM "$child" 2>/dev/null || true # the signal came before
+  [[ -z $stopped ]] || kill -TERM "$child" 2>/dev/null || true # the signal arrived earlier
   while kill -0 "$child" 2>/dev/null; do wait "$child" || true; done
   [[ -z $stopped ]] || wait_for_locks
   judge_by_files
 }
 
-# Checks the input before jobs are submitted, because an invalid input should not wait in the queue before it is reported. If
-# several member runs differ only in their seed, only the first of these member runs is checked.
+# Checks the input before jobs are submitted, so that an invalid input is not reported only after waiting in the queue. Of member
+# runs that differ only in their seed, one is checked.
 check_inputs() {
   local k kind reason arguments
   local -A seen=()
@@ -414,8 +413,7 @@ check_inputs() {
   ((failed == 0)) || summarise 'nothing is submitted: correct the members that failed, or leave them out: '
 }
 
-# Waits until the member runs on other computers have ended. The member runs end shortly after the connection to the other computers
-# has ended.
+# Waits until the member runs on other computers have ended, which happens soon after the connection to these computers has ended.
 wait_for_locks() {
   local name
   for name in "${names[@]}"; do
@@ -424,9 +422,9 @@ wait_for_locks() {
   done
 }
 
-# Submits a job array to Slurm. Each task of the array forwards the signal TERM to its member runs. If a task reaches its time limit
-# and was not cancelled, it is added to the queue again. A task identifies itself by the number of the job array and its own number
-# in the array, because SLURM_JOB_ID of the last task is equal to the job number of the whole array.
+# Submits a job array to Slurm. Each task of the array forwards TERM to its member runs. A task that reaches its time limit,
+# without being cancelled, is requeued. A task identifies itself by the job number of the array and its own index, because the
+# SLURM_JOB_ID of the last task equals the job number of the whole array.
 submit_to_slurm() {
   local id='' here text site
   command -v sbatch >/dev/null || die "--engine slurm needs Slurm (no sbatch here)"
@@ -441,7 +439,7 @@ submit_to_slurm() {
   [[ -z $retry ]] || for name in "${names[@]}"; do forget_failure "$name"; done
   check_inputs
   judge_by_files
-  site=$(scontrol show config 2>/dev/null | awk '$1 == "MaxArraySize" { print $3 - 1 }' || true) # the largest index of a task
+  site=$(scontrol show config 2>/dev/null | awk '$1 == "MaxArraySize" { print $3 - 1 }' || true) # largest index of a task
   [[ $site =~ ^[1-9][0-9]*$ ]] || site=1000
   : "${tasks:=$((10*jobs))}"
   prepare_shares "$((tasks < site ? tasks : site))"
@@ -473,7 +471,7 @@ trap 'fail 75 "stopped before any member ran"' TERM INT
 unset CDPATH
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 script=$here/${BASH_SOURCE[0]##*/}
-functions=$(dirname -- "$(realpath -- "${BASH_SOURCE[0]}")")/ensemble_folder.sh # of the file to which a link refers
+functions=$(dirname -- "$(realpath -- "${BASH_SOURCE[0]}")")/ensemble_folder.sh # in the folder of the file to which a link refers
 [[ -r $functions ]] || die "cannot read $functions, which contains functions of $me: copy it to this place"
 # shellcheck source=runs/ensemble_folder.sh
 . "$functions"
@@ -524,7 +522,7 @@ done
 if [[ -n $manifest ]]; then
   [[ -z $seeds && ${#scans[@]} == 0 ]] || die "--manifest cannot be combined with --seeds or --scan"
   [[ -f $manifest && -r $manifest ]] || die "cannot read $manifest, or it is not an ordinary file"
-  if [[ -n $share ]]; then # a share reads its own lines: a long list takes seconds
+  if [[ -n $share ]]; then # each share reads only its own lines, because reading a long list takes seconds
     read_manifest < <(awk -v k="${share%/*}" -v m="${share#*/}" 'NR % m == k % m' "$manifest")
     ((${#names[@]} > 0)) || exit 0
   else
@@ -541,8 +539,7 @@ for k in "${!overrides[@]}"; do
   overrides[k]=${common:+$common${overrides[k]:+ }}${overrides[k]}
 done
 
-# Share K of M consists of the member runs with the numbers K, K + M, K + 2M, and so on. If a manifest is given, the number of a
-# member run is the number of its line in the manifest.
+# Share K of M consists of the member runs K, K + M, K + 2M, and so on; with a manifest, these are numbers of lines.
 if [[ -n $share ]]; then
   task=${SLURM_ARRAY_JOB_ID:+${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID:-}}
   task=${task:-share $share}
@@ -554,7 +551,7 @@ if [[ -n $share ]]; then
 fi
 
 program=${here%/*}/build/ricochet
-[[ ! -x $here/ricochet ]] || program=$here/ricochet # program and script are installed in the same folder
+[[ ! -x $here/ricochet ]] || program=$here/ricochet # installed in the same folder
 program=${RICOCHET:-$program}
 [[ -f $program && -x $program ]] || die "there is no program $program: run make, or set RICOCHET"
 if [[ -n $dry ]]; then
@@ -564,7 +561,7 @@ if [[ -n $dry ]]; then
   reason=$("$program" "${arguments[@]}" 2>&1 </dev/null) || status=$?
   ((status != 2)) || die "member ${names[0]} cannot run: ${reason##*$'\n'}"
   ((status == 0)) || printf '%s: note: member %s cannot run yet: %s\n' "$me" "${names[0]}" "${reason##*$'\n'}" >&2
-  exit 0 # an initial-configuration file may be a result of another sweep that does not exist yet
+  exit 0 # an initial-configuration file may be produced by another sweep, and not exist yet
 fi
 command -v flock >/dev/null || die "the program flock is missing (package util-linux)"
 reason=$(mkdir -p -- "$folder" 2>&1) || fail 3 "cannot make $folder: ${reason##*: }"

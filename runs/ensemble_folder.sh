@@ -1,9 +1,9 @@
 # shellcheck shell=bash
 # shellcheck disable=SC2154,SC2034 # ensemble.sh assigns `folder` and other variables, and reads variables that this file assigns
 
-# Functions with which ensemble.sh reads and writes the files of a sweep. From the files in `folder` they determine which member
-# runs are finished, have failed or can continue, and they store the settings of the member runs. They never write through links,
-# into FIFOs, or into files that ensemble.sh did not create. Errors are reported by `fail` and `die` of ensemble.sh.
+# Functions with which ensemble.sh reads and writes the files of a sweep. They determine from the files in `folder` which member
+# runs are finished, have failed or can continue, and store the settings of the member runs. They never write through links, into
+# FIFOs, or into files that ensemble.sh did not create. Errors are reported by `fail` and `die` of ensemble.sh.
 
 # may_be_ours FILE: succeeds if FILE does not exist or is an ordinary file.
 may_be_ours() { [[ ! -L $1 && (! -e $1 || -f $1) ]]; }
@@ -13,8 +13,8 @@ check_ordinary() {
     fail 3 "$1 is not an ordinary file: remove it, or choose another folder"
 }
 
-# put FILE: writes standard input to FILE, either completely or not at all. An existing file is replaced by a new one, so that other
-# hard links keep its old contents.
+# put FILE: writes standard input to FILE, completely or not at all. An existing file is replaced by a new one, so that other hard
+# links keep its old contents.
 put() {
   local new=$folder/.new.$$.${HOSTNAME:-} reason
   check_ordinary "$1"
@@ -24,8 +24,8 @@ put() {
   fi
 }
 
-# Sets `last_line` to the last line in the log file of the member run NAME, without starting a process, which would be too slow for
-# up to 100 000 member runs.
+# Sets `last_line` to the last line in the log file of the member run NAME. No process is started, which would be too slow for up
+# to 100 000 member runs.
 read_last_line() {
   local lines=()
   last_line=''
@@ -41,14 +41,14 @@ last_words() {
   printf '%s\n' "$last_line"
 }
 
-is_finished=': is a finished run, ' # the answer to --resume if a stop rule is met already
-goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line in the log of a member that has not failed
+is_finished=': is a finished run, ' # the answer to --resume if a stop condition is satisfied already
+goes_on='^(stopped .*|killed by signal .*|.*--resume continues.*|)$' # last line in the log of a member run that has not failed
 
-# Succeeds if the member run NAME has a finished output file, or one from which it can continue. The log file of a failed member run
-# states the reason.
+# Succeeds if the member run NAME has a finished output file, or one from which it can continue. The log of a failed member run
+# gives the reason.
 has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
 
-# An output file older than the input file, or being extended by a run, does not count as finished.
+# An output file that is older than the input file, or is being extended by a run, does not count as finished.
 is_done() { [[ -e $folder/$1.h5 && ! -e $folder/$1.h5.part && ! $folder/input.nml -nt $folder/$1.h5 ]]; }
 
 # may_continue NAME OVERRIDES: succeeds if the program can continue the member run NAME with the settings OVERRIDES.
@@ -65,8 +65,8 @@ has_failed() {
   [[ ! $last_line =~ $goes_on ]]
 }
 
-# Opens the log file of a member run for appending, and stores its file descriptor in the variable `lock`. The function fails unless
-# the log file is an ordinary file with a single hard link that has not been replaced since it was opened.
+# Opens the log file of a member run for appending, and stores its file descriptor in `lock`. Fails unless the log is an ordinary
+# file with a single hard link that has not been replaced since it was opened.
 open_log() {
   may_be_ours "$1" && { exec {lock}>>"$1"; } 2>/dev/null || return
   [[ ! -L $1 && $1 -ef /dev/fd/$lock && $(stat -L -c %h "/dev/fd/$lock") == 1 ]] && return
@@ -74,8 +74,7 @@ open_log() {
   return 1
 }
 
-# Appends an empty line to the log file of the member run NAME. Without the empty line, the last line of the log file could be
-# attributed to the next attempt.
+# Appends an empty line to the log file of the member run NAME, so that its last line is not attributed to the next attempt.
 forget_failure() {
   local lock
   has_failed "$1" && open_log "$folder/$1.log" || return 0
@@ -83,12 +82,12 @@ forget_failure() {
   exec {lock}>&-
 }
 
-# Checks that the settings of the member runs agree with the settings of member runs of the same names that earlier commands
-# performed in this folder. The settings are compared because each result is identified only by the name of its member run.
+# Checks that the settings of the member runs agree with those of member runs of the same names from earlier commands in this
+# folder, because a result is identified only by the name of its member run.
 remember() {
   local line name k door='' changed='' mended='' extended=() found=()
   local -A before=() linked=()
-  if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time, if the file system supports locks
+  if { exec {door}<"$folder"; } 2>/dev/null; then # only one command at a time, if the file system supports locks
     flock -w 60 -E 75 "$door" 2>/dev/null || (($? != 75)) ||
       fail 3 "$folder is locked by another command: try again later"
   fi
@@ -99,7 +98,7 @@ remember() {
   if [[ -e $folder/manifest.txt ]]; then
     while IFS= read -r line; do before[x${line%%$'\t'*}]=${line#*$'\t'}; done <"$folder/manifest.txt"
   fi
-  [[ -e $folder/input.nml ]] || found=("${names[@]}") # results from elsewhere are left as they are
+  [[ -e $folder/input.nml ]] || found=("${names[@]}") # runs from elsewhere are left as they are
   if [[ -e $folder/input.nml ]] && ! cmp -s -- "$input" "$folder/input.nml"; then
     [[ -e $folder/manifest.txt ]] ||
       fail 3 "$folder/input.nml is not the input of an ensemble: choose another folder"
@@ -134,8 +133,8 @@ remember() {
   for name in "${found[@]}"; do
     [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -- "$folder/$name.h5"
   done
-  # While a .part file exists, the modification time of the output file is not changed, because the program that is extending the
-  # output file identifies the file by this time.
+  # While a .part file exists, the modification time of the output file is preserved, because the program that is extending it
+  # identifies it by this time.
   for name in "${extended[@]}"; do
     [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -d @1 -- "$folder/$name.h5"
   done

@@ -28,12 +28,12 @@ for system; do
   "runs/$system.sh" "${options[@]}" || status=$?
   case $status in
   0) ;;
-  75 | 130 | 143) exit 75 ;; # stopped on request: the same command continues
+  75 | 130 | 143) exit 75 ;; # stopped on request; the same command continues
   *) failed+=("$system (exit $status)") ;;
   esac
 done
 
-# Writes a section of the page for each existing figure: its name, its title, and the script that draws it.
+# Writes a section of the page for each existing figure, with its name, its title, and the script that draws it.
 section() {
   local name=$1 title=$2 script=$3 file
   for file in "$name".{png,mp4,gif}; do

@@ -4,7 +4,7 @@
 # each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Frames every half collision per disk resolve the relaxation. The histogram contains the speeds of every tenth frame.
+# Frames at every half collision per disk resolve the relaxation. The histogram uses the speeds in every tenth frame.
 for count in 1000 2000; do
   runs/ensemble.sh input/gas.nml -d "$data" --scan "species.gas.count=$count" --seeds 1-4 \
     --set stop.collisions_per_disk=65 --set "output.frames_every_collisions=$((count / 4))" \

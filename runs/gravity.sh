@@ -17,7 +17,7 @@ runs/ensemble.sh input/gravity_steps.nml -d "$data/rates_steps" "${rates[@]}" \
 "$python" post/missed.py "$data"/rates_{events,steps}/*.h5 "${units[@]}" \
   -o "$figures/gravity_missed.png" --csv "$figures/gravity_missed.csv"
 
-# Task 2: time after which both species have equal kinetic energies, for four widths of the initial velocity distribution and 100 seeds
+# Task 2: time until both species have the same kinetic energy, for four widths of the initial velocity distribution and 100 seeds
 # each.
 for v0 in 0.1 0.5 1 2; do
   for seed in {1..100}; do

@@ -5,7 +5,7 @@
 # show the hopper, a rotating drum, a dragged intruder and a stirrer. Takes about five minutes of processor time.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
-# Writes a manifest with a member run for each width and seed. Disks that have fallen 0.05 below the outlet are recycled to the top.
+# Writes a manifest with a member run for each width and seed. Disks that fall 0.05 below the outlet are recycled to the top.
 for width in 0.10 0.12 0.16 0.20 0.24 0.28 0.32 0.36; do
   for seed in 1 2 3 4; do
     awk -v D="$width" -v seed="$seed" 'BEGIN {

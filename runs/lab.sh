@@ -5,7 +5,7 @@
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 runs/ensemble.sh input/lab.nml -d "$data" --seeds 1 "$@"
-# Frame 50 shows the state after 5000 events. The later 500 frames contain 50 000 speeds in total.
+# Frame 50 shows the state after 5000 events. The 500 frames that follow contain 50 000 speeds in total.
 "$python" post/speeds.py "$data/seed_1.h5" --frames 51: --equilibration 0 --min-separation 0 \
   -o "$figures/lab_speeds.png" --csv "$figures/lab_speeds.csv"
 runs/ensemble.sh input/lab.nml -d "$data/start" --seeds 1 --set stop.events=300 \

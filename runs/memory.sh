@@ -12,7 +12,7 @@
 #   runs/memory.sh 10000000       measures 10^7 disks, and only the kinds of runs with domains
 #   runs/memory.sh 490000 file    measures only the kinds of runs whose names contain the word "file"
 set -euo pipefail
-export LC_ALL=C # awk then reads and writes 0.5 with a point in every language
+export LC_ALL=C # so that awk reads and writes 0.5 with a point in every language
 case ${1:-} in -h | --help) sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 program=$(realpath "${RICOCHET:-build/ricochet}")
@@ -20,8 +20,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 verdict=0
 
-# kind DISKS NAME TEXT...: performs a run and prints a row of the table. The input file consists of the lines TEXT, with %N replaced
-# by the number of disks. The output file is kept for other kinds of runs if NAME begins with `keep`.
+# kind DISKS NAME TEXT...: executes a run and prints a row of the table. The input file consists of the lines TEXT, with %N
+# replaced by the number of disks. The output file is kept for other kinds of runs if NAME begins with `keep`.
 kind() {
   local disks=$1 name=$2 out=$work/run.h5 assumed used
   shift 2

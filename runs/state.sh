@@ -36,7 +36,7 @@ TABLE
   --csv "$figures/correlations.csv"
 "$python" post/rates.py "$data"/memory_0.3/*.h5 -o "$figures/rates.png" --csv "$figures/rates.csv"
 
-# The theory of the cooling of a dilute gas applies until flows and clusters develop (shear and clustering instability).
+# The theory of a cooling dilute gas applies until flows and clusters develop (shear and clustering instability).
 runs/ensemble.sh input/bulk.nml -d "$data/cooling" --seeds 1-8 \
   --set species.disks.packing_fraction=0.02 --set stop.collisions_per_disk=60 \
   --set output.observables_every_collisions=100 --scan contact.restitution=0.95,0.9,0.8 "$@"
