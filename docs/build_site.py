@@ -2,15 +2,14 @@
 
     python docs/build_site.py build
 
-The examples of the pages use the program build/ricochet, or the program that the variable
-RICOCHET of the environment names.
+Examples on the pages use the program build/ricochet, or the one that the environment variable
+RICOCHET names.
 
-The command `make docs` runs this script.  The script copies all pages to the folder
-build/docs-sources, and changes links between pages of different folders to links within the site;
-from this copy, Sphinx builds the site build/docs.  In each folder of docs/, the file README.md is
-the index page, and the site lists the pages of the folder in the order of the links in README.md.
-A page NAME.md beside a folder NAME is the index page of that folder.  The script ends with exit
-code 1 if Sphinx prints a warning, or if a link within the site leads nowhere.
+`make docs` runs this script. It copies all pages to the folder build/docs-sources, converting links
+between pages of different folders to links within the site; from this copy Sphinx builds the site
+build/docs. The README.md of each folder of docs/ is its index page, and its links determine the
+order of the pages of the folder on the site. A page NAME.md beside a folder NAME is the index page
+of that folder. The exit code is 1 if Sphinx prints a warning or a link within the site is broken.
 """
 
 import argparse
@@ -33,9 +32,9 @@ from urllib.parse import unquote, urlsplit
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-#: Folder of the site with the pages about the Fortran source, which the program FORD writes.
+#: Folder of the site with the pages that the program FORD generates from the Fortran source.
 FORTRAN = "fortran"
-#: Pages that Sphinx generates and that have no source file.
+#: Pages that Sphinx generates without a source file.
 OWN = ("genindex.html", "search.html", "py-modindex.html")
 #: Pages whose sources are outside docs/, with their names in the folder `project` of the site.
 OUTSIDE = {
@@ -50,8 +49,8 @@ OUTSIDE = {
     "LICENSE": "licence",
 }
 GLOSSARY = "explanation/glossary"
-#: Script of the search page, which shows excerpts of pages.  A page that is opened as a file cannot
-#: read the other pages; therefore the script contains their texts.
+#: Script of the search page, which shows excerpts of pages. It contains their texts, because a page
+#: opened as a file cannot read other pages.
 EXCERPTS = """const TEXTS = {texts};
 window.fetch = async page => ({{
   text: async () => `<div role="main">${{TEXTS[page.replace(/^\\.\\//, "")] ?? ""}}</div>`,
@@ -80,7 +79,7 @@ API_HEAD = """\
 
 
 def sources() -> dict[str, str]:
-    """Return a dictionary from the path of each page in the project to its path in the site."""
+    """Return a dictionary from the path of each page in the project to its path on the site."""
     pages = {}
     for path in sorted([*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]):
         name = path.relative_to(DOCS).with_suffix("").as_posix()
@@ -92,16 +91,16 @@ def sources() -> dict[str, str]:
 
 
 class Stage:
-    """Folder that receives the sources of the documentation site."""
+    """Folder of the sources of the documentation site."""
 
     def __init__(self, folder: Path) -> None:
-        """Store the folder for the sources; its earlier files remain until `tidy` is called."""
+        """Store the folder, whose earlier files remain until `tidy` is called."""
         self.folder = folder
         self.pages = sources()
         self.written: set[Path] = set()
 
     def write(self, name: str, content: str | bytes) -> None:
-        """Write a file unless its content is unchanged; Sphinx then rebuilds only changed pages."""
+        """Write a file if its content has changed, so that Sphinx rebuilds only changed pages."""
         path = self.folder / name
         data = content.encode() if isinstance(content, str) else content
         if not path.exists() or path.read_bytes() != data:
@@ -110,13 +109,13 @@ class Stage:
         self.written.add(path)
 
     def tidy(self) -> None:
-        """Remove the files that earlier calls of the script wrote and this call did not write."""
+        """Remove files written by earlier calls of the script but not by this one."""
         for path in self.folder.rglob("*"):
             if path.is_file() and path not in self.written:
                 path.unlink()
 
     def target(self, page: str, link: str) -> str:
-        """Convert a link of a page to a link within the site, and copy linked files."""
+        """Convert a link of a page to a link within the site, and copy any linked file."""
         name, mark, section = link.partition("#")
         if not name or link.startswith(ELSEWHERE):
             return link
@@ -136,7 +135,7 @@ class Stage:
     def relinked(self, page: str, text: str) -> str:
         """Convert all links in the text of a page to links within the site.
 
-        A link to a folder that contains no page is replaced by the text of the link.
+        A link to a folder without a page is replaced by its text.
         """
         here = (ROOT / page).parent
 
@@ -149,11 +148,11 @@ class Stage:
         return LINK.sub(lambda found: self.target(page, found[0]), text)
 
     def contents(self, page: str, text: str) -> str:
-        """Return a hidden table of contents, which lists the pages of the folder of an index page.
+        """Return a hidden table of contents that lists the pages in the folder of an index page.
 
-        An index page README.md lists pages of its own folder, and any other index page NAME.md
-        lists pages of the folder NAME.  If an index page has a section "All pages", only the links
-        in this section are listed.
+        An index page README.md lists pages of its own folder, any other index page NAME.md those of
+        the folder NAME. If there is a section "All pages", only the links in this section are
+        listed.
         """
         here = posixpath.dirname(page)
         folder = here if page.endswith("README.md") else page.removesuffix(".md")
@@ -187,8 +186,8 @@ class Stage:
                 continue
             if page == "LICENSE":
                 text = f"# Licence\n\n{text}"
-            # Mermaid diagrams remain text, because a browser could draw them only with a script
-            # from another server.
+            # Mermaid diagrams remain text, because a browser would need a script from another
+            # server to draw them.
             text = self.relinked(page, text).replace("```mermaid", "```text")
             text = with_cards(text)
             if name == GLOSSARY:
@@ -199,7 +198,7 @@ class Stage:
             self.write(f"{name}.md", text)
 
     def write_project_index(self) -> None:
-        """Write an index of the pages whose sources are outside the folder docs/."""
+        """Write an index of the pages whose sources are outside docs/."""
         own = [name for name in self.pages.values() if name.startswith("project/")]
         lines = "\n".join(f"/{name}" for name in own)
         self.write(
@@ -244,7 +243,7 @@ class Stage:
         )
 
     def write_index(self, folder: str, text: str, names: list[str]) -> None:
-        """Write the index page of a folder of the reference, with links to the other pages."""
+        """Write the index page of a folder of the reference, with links to its other pages."""
         contents = "\n".join(names)
         self.write(
             f"reference/{folder}/index.md",
@@ -252,7 +251,7 @@ class Stage:
         )
 
     def write_script_pages(self) -> None:
-        """Write a page for each script in post/, with the texts of its command-line parser."""
+        """Write a page for each script in post/, based on its command-line parser."""
         drawn = self.figures_of_scripts()
         names = []
         for path in sorted((ROOT / "post").glob("*.py")):
@@ -275,7 +274,7 @@ class Stage:
         )
 
     def figures_of_scripts(self) -> dict[str, list[str]]:
-        """Return, for each script in post/, the figures on the pages that the script has drawn."""
+        """Return, for each script in post/, the figures on the pages that it has drawn."""
         shown = {path.name: path.relative_to(ROOT).as_posix() for path in DOCS.rglob("*.png")}
         found: dict[str, list[str]] = {}
         for path in sorted((ROOT / "runs").glob("*.sh")):
@@ -289,7 +288,7 @@ class Stage:
 
 
 def with_cards(text: str) -> str:
-    """Convert the lists of a page that follow the comment `<!-- cards -->` to grids of cards."""
+    """Convert each list that follows the comment `<!-- cards -->` to a grid of cards."""
 
     def grid(found: re.Match) -> str:
         cards = [
@@ -304,10 +303,10 @@ def with_cards(text: str) -> str:
 
 
 def with_index_entries(text: str) -> str:
-    """Mark the terms of the glossary as entries of the index, so that a search finds them first.
+    """Mark the terms of the glossary as index entries, so that a search finds them first.
 
-    A row of a table explains a term in its first column or, after a symbol, the words with which
-    the second column begins.
+    A table row explains the term in its first column or, after a symbol, the words at the beginning
+    of its second column.
     """
 
     def mark(words: str) -> str:
@@ -331,7 +330,7 @@ class ParserFoundError(Exception):
 
 
 def parser_of(path: Path) -> argparse.ArgumentParser | None:
-    """Return the parser of a script, which runs only until it parses its command line, or None."""
+    """Return the parser of a script, which is stopped when it parses its command line, or None."""
     source = importlib.util.spec_from_file_location(f"script_{path.stem}", path)
     module = importlib.util.module_from_spec(source)
     source.loader.exec_module(module)
@@ -353,7 +352,7 @@ def parser_of(path: Path) -> argparse.ArgumentParser | None:
 
 
 def escaped(text: str) -> str:
-    """Escape the characters of a text that have a special meaning in Markdown, except in code."""
+    """Escape characters with a special meaning in Markdown, except in code."""
     parts = re.split(r"(`[^`]*`)", text)
     return "".join(
         part if part.startswith("`") else re.sub(r"([*_<>|$\\\[\]])", r"\\\1", part)
@@ -362,7 +361,7 @@ def escaped(text: str) -> str:
 
 
 def prose(description: str) -> str:
-    """Convert the description of a script to Markdown; indented lines become code."""
+    """Convert the description of a script to Markdown, with indented lines as code."""
     paragraphs = re.split(r"\n\s*\n", description.strip())
     code = [paragraph.startswith("    ") for paragraph in paragraphs]
     return "\n\n".join(
@@ -372,7 +371,7 @@ def prose(description: str) -> str:
 
 
 def options_of(parser: argparse.ArgumentParser) -> Iterator[str]:
-    """Return a row of a table for each option of a parser."""
+    """Yield a table row for each option of a parser."""
     for action in parser._actions:
         if action.dest == "help" or action.help == argparse.SUPPRESS:
             continue
@@ -384,7 +383,7 @@ def options_of(parser: argparse.ArgumentParser) -> Iterator[str]:
 
 
 class Page(HTMLParser):
-    """Parser that collects the links, the anchors and the text of an HTML page of the site."""
+    """Parser that collects links, anchors and text of an HTML page of the site."""
 
     def __init__(self, path: Path) -> None:
         """Read a page."""
@@ -393,7 +392,7 @@ class Page(HTMLParser):
         self.loaded: list[str] = []
         self.anchors: set[str] = set()
         self.words: list[str] = []
-        self.articles = 0  # number of elements <article> around the present position
+        self.articles = 0  # number of enclosing elements <article>
         self.feed(path.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -413,7 +412,7 @@ class Page(HTMLParser):
 
 
 def pages_of(site: Path) -> dict[Path, Page]:
-    """Return all pages of the site except those that FORD writes."""
+    """Return all pages of the site except those generated by FORD."""
     return {path: Page(path) for path in site.rglob("*.html") if FORTRAN not in path.parts}
 
 
@@ -429,9 +428,9 @@ def write_excerpts(site: Path) -> None:
 
 
 def broken(site: Path) -> list[str]:
-    """Return the broken links of the site; links on the pages that FORD writes are not checked.
+    """Return the broken links of the site, except links on pages generated by FORD.
 
-    Scripts, styles and pictures from other machines also count as broken, because the site works
+    Scripts, styles and pictures from other servers also count as broken, because the site must work
     without a network.
     """
     pages = pages_of(site)
@@ -456,7 +455,7 @@ def broken(site: Path) -> list[str]:
 
 
 def main(build: Path) -> int:
-    """Build the site, and return 0 if Sphinx printed no warning and no link is broken."""
+    """Build the site; return 0 if Sphinx printed no warning and no link is broken."""
     site, stage = build / "docs", Stage(build / "docs-sources")
     stage.copy_pages()
     stage.write_project_index()
@@ -473,7 +472,7 @@ def main(build: Path) -> int:
     for path in site.rglob("*.html"):
         name = path.relative_to(site)
         made_by_sphinx = name.parts[0] in ("_static", "_downloads", FORTRAN) or name.name in OWN
-        if not made_by_sphinx and name not in names:  # of an earlier call
+        if not made_by_sphinx and name not in names:  # left by an earlier call
             path.unlink()
     write_excerpts(site)
     if status == 0 and not (site / FORTRAN / "index.html").exists():

@@ -1,10 +1,10 @@
-"""Draw the pictures input/pictures/NAME.png of all input files that the laboratory offers.
+"""Draw the pictures input/pictures/NAME.png of all input files offered in the laboratory.
 
     python docs/chooser_pictures.py [NAME...]
 
-Each picture shows the simulation of an input file at the time that input/chooser.json specifies.
-If there are few disks, the picture also shows their paths.  Each picture contains a checksum of the
-input file, with which a test can detect that the input file has changed.
+Each picture shows the simulation of an input file at the time given in input/chooser.json, for few
+disks with their paths. It contains a checksum of the input file, so that a test can detect changes
+of the file.
 """
 
 import hashlib
@@ -33,13 +33,13 @@ PALETTE = [g for grey in (77, 130, 204, 255) for g in (grey,) * 3] + [
 
 
 def digest(path: Path, at: float) -> str:
-    """Return a checksum of the time and of the input without its comments."""
+    """Return a checksum of the time, and of the input without its comments."""
     lines = [line.split("!")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
     return hashlib.sha256("\n".join([*filter(None, lines), repr(float(at))]).encode()).hexdigest()
 
 
 def draw_sides(axes: Axes, room: np.ndarray, sides: list[dict]) -> None:
-    """Draw the sides of a box with the corners `room` (2, 2), except those that are open."""
+    """Draw the sides of a box with the corners `room` (2, 2), except open ones."""
     (x0, y0), (x1, y1) = room
     if not any(side.get("open") for side in sides):
         axes.add_patch(Rectangle(room[0], x1 - x0, y1 - y0, fill=False, color="0.3", lw=0.8))
@@ -77,7 +77,7 @@ def picture(path: Path, at: float) -> bytes:
             axes.add_patch(Circle(one.centre, one.radius, facecolor=colour, edgecolor="0.3"))
         walls = walls_of(run.parameters)
         axes.add_collection(LineCollection(walls, color="0.3", lw=0.8))
-        inside = np.isfinite(run.position[:, 0])  # others are outside of an open box
+        inside = np.isfinite(run.position[:, 0])  # the others are outside an open box
         least = min(0.006, 0.2 / np.sqrt(run.n_disks)) * np.max(upper - lower)
         size = 2 * np.maximum(run.radius, least)[inside]
         colours = [SPECIES[(k - 1) % len(SPECIES)] for k in run.species]

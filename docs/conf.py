@@ -30,7 +30,7 @@ html_copy_source = False
 html_show_sourcelink = False
 pygments_style = "default"
 highlight_language = "none"
-smartquotes = False  # they would turn the two hyphens of an option into a dash
+smartquotes = False  # would turn the two hyphens of an option into a dash
 
 myst_enable_extensions = ["colon_fence", "dollarmath", "attrs_block"]
 myst_heading_anchors = 4
@@ -48,7 +48,7 @@ numpydoc_xref_param_type = False
 
 
 def mathml(self: Any, node: Any, display: str) -> None:
-    """Write a formula as MathML, which browsers show without a script and without a network."""
+    """Write a formula as MathML, which browsers display without a script or a network."""
     self.body.append(latex2mathml.converter.convert(node.astext(), display=display))
     if display == "block":
         self.body.append("\n")
@@ -58,20 +58,20 @@ def mathml(self: Any, node: Any, display: str) -> None:
 
 
 def without_aliases(app: Any, kind: str, name: str, *rest: Any) -> None:
-    """Remove the generated text "Alias for field number" from the pages about named tuples."""
+    """Remove the generated text "Alias for field number" from pages about named tuples."""
     lines = rest[-1]
     if lines and lines[0].startswith("Alias for field number"):
         lines[:] = []
 
 
 def add_excerpts(app: Any, page: str, *_: Any) -> None:
-    """Load the texts of all pages, which docs/build_site.py writes, in the page of the search."""
+    """Load the texts of all pages, written by docs/build_site.py, in the search page."""
     if page == "search":
         app.add_js_file("excerpts.js")
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Register the function that writes formulas, which Sphinx calls."""
+    """Register the functions that Sphinx calls."""
     app.connect("autodoc-process-docstring", without_aliases)
     app.connect("html-page-context", add_excerpts)
     app.add_html_math_renderer(

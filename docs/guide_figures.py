@@ -2,11 +2,11 @@
 
     python docs/guide_figures.py [NAME...]
 
-The script executes the code blocks of the guides that the arguments name, or of all guides.  The
-test tests/runs/test_pages.py executes the same code blocks, but shortens the runs.  If a guide
-shows the picture NAME.png, its code blocks write the figure runs/NAME.png, and the script copies
-this figure to the folder of the guide, with fewer pixels and colours.  If the environment variable
-GUIDE_RUNS names a folder, the output files of the runs are kept in this folder.
+The script executes the code blocks of all guides, or of those named. The test
+tests/runs/test_pages.py executes the same code blocks with shorter runs. If a guide shows the
+picture NAME.png, its code blocks write the figure runs/NAME.png, which the script copies to the
+folder of the guide with fewer pixels and colours. Output files of the runs are kept in the folder
+that the environment variable GUIDE_RUNS names, if any.
 """
 
 import os
@@ -26,12 +26,12 @@ MOST, NARROW = 120_000, 700  # [bytes] and [pixels]: pictures of many disks beco
 
 
 def pictures_of(page: str) -> list[str]:
-    """Return the names of the pictures in a guide that are stored in the folder of the guide."""
+    """Return the names of the pictures that are stored in the folder of a guide."""
     return re.findall(r"!\[[^]]*\]\((\w+)\.png\)", page)
 
 
 def main() -> None:
-    """Make the figures of all guides, or of the guides that the command line names."""
+    """Make the figures of all guides, or of those named on the command line."""
     program = ROOT / "build" / "ricochet"
     for name in sys.argv[1:] or [path.stem for path in sorted(GUIDES.glob("*.md"))]:
         page = (GUIDES / f"{name}.md").read_text()

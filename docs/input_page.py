@@ -1,10 +1,10 @@
-"""Write the pages on input variables from the table that the program prints.
+"""Write the pages on input variables from the table printed by the program.
 
-python docs/input_page.py build/ricochet
+    python docs/input_page.py build/ricochet
 
-The page docs/reference/input.md lists the groups of input variables.  For each group, the script
-also writes a page in docs/reference/input/, which describes the variables and contains an example
-and a picture.  The example of a group is a part of an input file in input/.
+The page docs/reference/input.md lists the groups of input variables. Each group has its own page in
+docs/reference/input/, with a description of its variables, an example taken from an input file in
+input/, and a picture.
 """
 
 import json
@@ -105,15 +105,15 @@ there is no default. Three more rows appear where they apply:
 
 
 def said(program: Path, *words: str) -> str:
-    """Return the output of the program when it is called with an option."""
+    """Return the output of the program when called with the given options."""
     return subprocess.run([program, *words], check=True, capture_output=True, text=True).stdout
 
 
 def variables(program: Path) -> dict[str, dict[str, dict]]:
-    """Return the input variables that belong to each group in `GROUPS`.
+    """Return the input variables of each group in `GROUPS`.
 
-    Variables that are common to all kinds of boundaries form a separate group.  Numbers in the
-    table of variables are stored as texts in the format of the program.
+    Variables shared by all kinds of boundaries form a group of their own. Numbers in the table are
+    texts in the format of the program.
     """
     table = json.loads(said(program, "--print-variables"), parse_float=str, parse_int=str)
     walls = [table[group] for group in BOUNDARIES]
@@ -134,14 +134,14 @@ def written(entry: dict) -> str:
 
 
 def shared(walls: list[dict[str, dict]], name: str) -> bool:
-    """Return whether all kinds of boundaries have a variable of this name with the same meaning."""
+    """Return whether all kinds of boundaries have this variable with the same meaning."""
     return len({wall[name]["help"] for wall in walls if name in wall}) == 1 and all(
         name in wall for wall in walls
     )
 
 
 def condition(group: str, entry: dict) -> str:
-    """Return the setting that a variable requires, or an empty text if it requires none."""
+    """Return the setting that a variable requires, or '' if it requires none."""
     if not entry["goes_with"]:
         return ""
     [(choice, words)] = entry["goes_with"].items()
@@ -152,7 +152,7 @@ def condition(group: str, entry: dict) -> str:
 
 
 def facts(group: str, entry: dict) -> list[str]:
-    """Return the rows of the table of a variable, such as its allowed values."""
+    """Return the table rows of a variable, such as its allowed values."""
     rows = {"allowed": entry["allowed"] + f" [{entry['unit']}]" * bool(entry["unit"])}
     if entry["default"] is not None:
         rows["default"] = f"`{written(entry)}`"
@@ -169,7 +169,7 @@ def facts(group: str, entry: dict) -> list[str]:
 
 
 def section(group: str, name: str, entry: dict) -> str:
-    """Return the section of the page that describes one variable."""
+    """Return the section of the page that describes a variable."""
     title = name if group == LAW else f"{group}.{name}"
     meanings = (entry["meanings"] or {}).items()
     lines = [f"### `{title}`", "", plain(entry["help"]), ""]
@@ -180,22 +180,22 @@ def section(group: str, name: str, entry: dict) -> str:
 
 
 def plain(text: str) -> str:
-    """Return the text after escaping the characters that Markdown uses for emphasis."""
+    """Escape characters that Markdown uses for emphasis."""
     return text.replace("**", "^")
 
 
 def file_of(group: str) -> str:
-    """Return the file name, without extension, of the page about a group of input variables."""
+    """Return the file name, without extension, of the page of a group."""
     return "boundaries" if group == LAW else group
 
 
 def title_of(group: str) -> str:
-    """Return the heading of the page about a group of input variables."""
+    """Return the heading of the page of a group."""
     return group if group == LAW else f"&{group}"
 
 
 def example_of(group: str) -> list[str]:
-    """Return the section with the example of a group, which shows a part of an input file."""
+    """Return the section with the example of a group, a part of an input file."""
     name = EXAMPLES[group]
     text = (ROOT / "input" / f"{name}.nml").read_text(encoding="utf-8")
     kind = "side" if group == LAW else group

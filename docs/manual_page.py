@@ -1,8 +1,8 @@
 """Write the Unix manual page of a command (ricochet, ricochet-ensemble) from its --help text.
 
-python docs/manual_page.py build/ricochet PREFIX > ricochet.1
+    python docs/manual_page.py build/ricochet PREFIX > ricochet.1
 
-The version number is taken from the program `ricochet` in the folder that contains the command.
+The version number is that of the program `ricochet` in the folder of the command.
 """
 
 import posixpath
@@ -13,7 +13,7 @@ from textwrap import dedent
 
 from input_page import GROUPS, LAW, said, variables, written
 
-#: Section of the manual page by the first word (before a colon) of a paragraph of the --help text.
+#: Section of the manual page, by the first word (before a colon) of a paragraph of the --help text.
 SECTIONS = {
     "usage": "SYNOPSIS",
     "members": "OPTIONS",
@@ -50,7 +50,7 @@ Results, in the format H5MD. Until the run has finished: OUT.h5.part.
 
 
 def roff(text: str) -> str:
-    """Return the text after escaping the special characters of roff."""
+    """Escape the special characters of roff."""
     text = text.replace("\\", "\\e").replace("-", "\\-")
     return "\n".join("\\&" + line if line[:1] in {".", "'"} else line for line in text.split("\n"))
 
@@ -66,7 +66,7 @@ def section(paragraph: str) -> list[str]:
 
 
 def installed(link: re.Match) -> str:
-    """Convert a link to a page of the documentation to the path at which the page is installed."""
+    """Convert a link to a page of the documentation to the path of the installed page."""
     return f"PREFIX/share/doc/ricochet/{posixpath.normpath(f'docs/reference/input/{link[1]}')}"
 
 
@@ -92,7 +92,7 @@ def inputs(program: Path) -> list[str]:
 
 
 def page(command: Path, prefix: str) -> str:
-    """Return the text of the manual page in roff format."""
+    """Return the manual page in roff format."""
     program = command.with_name("ricochet")
     version = said(program, "--version").split()[1]
     headline, *paragraphs = said(command, "--help").rstrip().split("\n\n")

@@ -3,9 +3,7 @@
     make figures                         or the scripts in runs/ that draw some of the figures
     python docs/page_figures.py [NAME...]
 
-The script copies the figures that the arguments name, or all existing figures, from runs/figures/
-to the folders of the pages that show the figures.  The script reduces the numbers of pixels and
-colours of each figure.
+All existing figures, or those named, are copied to the folders of the pages that show them.
 """
 
 import io
@@ -34,22 +32,22 @@ SHOWN = {
     "gravity_laws": "tutorials",
     "gravity_missed": "tutorials",
 }
-#: Part of a figure, from its top, that the page shows [whole figure].
+#: Fraction of a figure, from its top, that the page shows [all].
 UPPER_PART = {"crater": 0.515}
 WIDTH, COLOURS = 1100, 128
 
 
 def reduced(path: Path, width: int = WIDTH, part: float = 1.0) -> bytes:
-    """Return a figure as a PNG file with at most `width` pixels per row and `COLOURS` colours.
+    """Return a figure as a PNG file, `width` pixels wide at most, with `COLOURS` colours.
 
-    The PNG file contains the fraction `part` of the figure, from the top.
+    Only the fraction `part` of the figure, from its top, is included.
     """
     picture = Image.open(path).convert("RGB")
     picture = picture.crop((0, 0, picture.width, round(part * picture.height)))
     if picture.width > width:
         height = round(picture.height * width / picture.width)
         picture = picture.resize((width, height), Image.Resampling.LANCZOS)
-    # The default method of Pillow (median cut) would replace colours of thin lines by others.
+    # The default method of Pillow (median cut) would replace the colours of thin lines.
     few = {"method": Image.Quantize.MAXCOVERAGE, "kmeans": 1, "dither": Image.Dither.NONE}
     file = io.BytesIO()
     picture.quantize(COLOURS, **few).save(file, format="png", optimize=True)

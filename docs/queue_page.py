@@ -3,8 +3,8 @@
     python docs/queue_page.py build/tests/four_disks                   the queues
     python docs/queue_page.py build/tests/four_disks docs/tutorials/queue.png    and the figure
 
-The event queues come from the program docs/four_disks.f90, which `make test` builds.  The program
-four_disks performs a real simulation of four disks, one event at a time.
+The queues come from the program docs/four_disks.f90, built by `make test`, which simulates four
+disks event by event.
 """
 
 import json
@@ -24,7 +24,7 @@ BOX, RADIUS = 4.0, 0.3
 
 @dataclass(frozen=True)
 class Expected:
-    """State of a disk at the time of its last event, and the predicted next event of the disk."""
+    """State of a disk after its last event, and its predicted next event."""
 
     disk: int
     place: np.ndarray
@@ -83,8 +83,8 @@ def table(now: float, queue: list[Expected]) -> str:
 def draw(axes: plt.Axes, now: float, queue: list[Expected]) -> None:
     """Draw the disks, their velocities, and the next event.
 
-    For each disk that takes part in the next event, a line shows its motion to the event, and an
-    outline shows its position at the event.
+    Each disk involved in the next event is drawn with a line to its position at the event, and with
+    its outline there.
     """
     first, disks = queue[0], {event.disk: event for event in queue}
     axes.add_patch(Rectangle((0, 0), BOX, BOX, fill=False, clip_on=False, **WALL))

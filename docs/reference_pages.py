@@ -1,10 +1,13 @@
-"""Write the reference pages about the C interface, the input files and the command line.
+"""Write the reference pages on the C interface, the input files, the command line and the scripts.
 
-python docs/reference_pages.py build/ricochet
+    python docs/reference_pages.py build/ricochet
 
-The script writes docs/reference/c.md from the header src/ricochet.h, docs/reference/inputs.md from
-the input files and input/chooser.json, the help text in docs/reference/command-line.md, and the
-tables of analyses and other scripts in docs/reference/scripts.md.
+Four pages in docs/reference/ are written:
+
+- c.md, from the header src/ricochet.h
+- inputs.md, from the input files and input/chooser.json
+- the help text in command-line.md, from the program
+- the tables of analyses and of other scripts in scripts.md, from their docstrings
 """
 
 import ast
@@ -37,7 +40,7 @@ the settings. The pictures show the simulations at one time; `make lab` shows th
 
 
 def c_page() -> str:
-    """Return the text of the page on the C interface."""
+    """Return the page on the C interface."""
     header = (ROOT / "src" / "ricochet.h").read_text(encoding="utf-8")
     intro, _, rest = header.partition("*/\n")
     first, _, more = intro.partition("\n\n       ")
@@ -70,7 +73,7 @@ def c_page() -> str:
 
 
 def parts_of(comment: str) -> tuple[str, list[tuple[str, str]], str]:
-    """Split a comment of the header into the description, the arguments and the return value."""
+    """Split a comment of the header into description, arguments and return value."""
     words: list[str] = []
     values: list[tuple[str, str]] = []
     returns: list[str] = []
@@ -95,7 +98,7 @@ def summary(path: Path) -> str:
 
 
 def inputs_page() -> str:
-    """Return the text of the gallery of input files."""
+    """Return the gallery of input files."""
     chooser = json.loads((ROOT / "input" / "chooser.json").read_text(encoding="utf-8"))
     subjects: dict[str, list[str]] = {}
     for name, entry in chooser.items():
@@ -116,7 +119,7 @@ def inputs_page() -> str:
 
 
 def command_page(program: Path) -> str:
-    """Return the page about the command line, with the present help text of the program."""
+    """Return the page on the command line, with the present help text of the program."""
     page = (ROOT / "docs/reference/command-line.md").read_text(encoding="utf-8")
     said = subprocess.run([program, "--help"], check=True, capture_output=True, text=True).stdout
     before, start, rest = page.partition("<!-- help -->\n")

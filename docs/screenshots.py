@@ -3,7 +3,7 @@
     python docs/screenshots.py [NAME...]
 
 The script starts the laboratory, opens it in headless Chromium, and writes pictures to
-docs/tutorials.  The script needs the program and its library (`make all library`), Chromium and
+docs/tutorials. It requires the program and its library (`make all library`), Chromium and
 chromedriver.
 """
 
@@ -20,14 +20,14 @@ sys.path[:0] = [str(DOCS), str(DOCS.parent / "tests"), str(DOCS.parent / "post")
 from browser import browsing  # noqa: E402
 from page_figures import reduced  # noqa: E402
 
-#: Input of each screenshot, and the time of the simulation at the screenshot.
+#: Input of each screenshot, and the simulated time at which it is taken.
 PICTURES = {
     "laboratory": ("mixture", 1.5),
     "laboratory_crater": ("crater", 0.48),
     "laboratory_collision": ("collision", 0),
     "laboratory_pump": ("pump", 17),
 }
-#: Time that the film shows, or -1 before the first picture.
+#: Time shown by the film, or -1 before the first picture.
 TIME = """const { film, moment } = filmOf(current()).inside?.() ?? {};
     return film ? moment.time : -1"""
 

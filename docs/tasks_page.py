@@ -3,9 +3,8 @@
     make figures                     or runs/mixture.sh, cooling.sh, crater.sh, gravity.sh alone
     python docs/tasks_page.py        reads runs/figures into docs/tasks.json, and writes the pages
 
-The file docs/tasks.json contains each measured number on the pages, with the error of the number.
-On a page, two HTML comments enclose each text that the script replaces; the first comment is the
-name of the text.
+docs/tasks.json contains each measured number on the pages with its error. On a page, each text that
+the script replaces is enclosed in two HTML comments, the first of which is its name.
 """
 
 import csv
@@ -20,7 +19,7 @@ from ricochet.analysis.statistics import rounded_to_error
 DOCS = Path(__file__).resolve().parent
 TABLES = DOCS.parent / "runs" / "figures"
 BLANK = re.compile(r"{(\S+?)}")  # placeholder of a number in a text
-Numbers = dict[str, tuple[float, float | None]]  # value and error (None without an error)
+Numbers = dict[str, tuple[float, float | None]]  # value and error (None if there is none)
 
 PAGES = ("exam", "gravity")
 TEXTS = {
@@ -98,13 +97,13 @@ def table(name: str) -> list[dict[str, str]]:
 
 
 def value(row: dict[str, str], name: str, error: str = "") -> tuple[float, float | None]:
-    """Return a number from a table row, with its error if the table contains the error."""
+    """Return a number from a table row, with its error if the table contains one."""
     error = error or f"{name}_error"
     return float(row[name]), float(row[error]) if error in row else None
 
 
 def mixture() -> Numbers:
-    """Return the energies and speeds of both species of the mixture in equilibrium."""
+    """Return energies and speeds of both species of the mixture in equilibrium."""
     return {
         f"{name}_{row['species']}{end}": value(row, name + end)
         for row in table("mixture")
@@ -114,7 +113,7 @@ def mixture() -> Numbers:
 
 
 def cooling() -> Numbers:
-    """Return the ratios of the temperatures of both species, and the energy left, after cooling."""
+    """Return the temperature ratios of the two species, and the energy left, after cooling."""
     end = {rule: table(f"cooling_{rule}")[-1] for rule in ("velocity", "normal")}
     found = {
         f"ratio_{xi}": value(end["velocity"], f"ratio_xi{xi}", f"ratio_error_xi{xi}")
@@ -138,7 +137,7 @@ def crater() -> Numbers:
 
 
 def gravity() -> Numbers:
-    """Return the results of the exercises about a gas under gravity."""
+    """Return the results of the exercises on a gas under gravity."""
     changes = [float(row["largest_change"]) for row in table("gravity_energy")]
     times = [value(row, "T_therm") for row in table("gravity_equipartition")]
     found = {"energy_change": (max(changes), None), "T_first": min(times), "T_last": max(times)}
@@ -180,7 +179,7 @@ def wrapped(paragraph: str) -> str:
 
 
 def filled(page: str, numbers: Numbers) -> str:
-    """Replace all texts of a page that contain results, and return the new page."""
+    """Return a page with all texts that contain results replaced."""
     for name, template in TEXTS.items():
         start, end = f"<!-- {name} -->\n", "<!-- end -->"
         if start not in page:

@@ -1,6 +1,6 @@
-# Package recipe for Spack.  To install Ricochet with Spack, copy this file into the folder
-# packages/ricochet/ of your Spack repository, and set `git` to the address of this project.  This
-# recipe has not been tested.
+# Package recipe for Spack, which has not been tested. To install Ricochet with Spack, copy this
+# file into the folder packages/ricochet/ of your Spack repository, and set `git` to the address of
+# this project.
 from spack.package import *
 from spack_repo.builtin.build_systems.makefile import MakefilePackage
 
@@ -25,9 +25,8 @@ class Ricochet(MakefilePackage):
     requires("%fortran=gcc@12:", msg="built and tested with gfortran")
 
     def build(self, spec, prefix):
-        # The compiler wrapper of Spack adds optimisation flags for the target processor.  The flags
-        # of the Makefile would optimise for the processor of the computer that compiles the
-        # program.
+        # The compiler wrapper of Spack adds optimisation flags for the target processor. Those of
+        # the Makefile would optimise for the processor of the compiling computer.
         make("ARCH=x86-64", "all", "library")
 
     def install(self, spec, prefix):
