@@ -1,11 +1,11 @@
-"""Measure the processor time of an analysis: reading, computing and drawing apart.
+"""Measure the processor times of an analysis for reading, computing and drawing.
 
     python tests/analysis_times.py speeds runs/gas/*.h5
     python tests/analysis_times.py driven runs/heated.h5 show=share
 
-Arguments with `=` are options of the analysis.  Frames are read on demand; the time that the
-functions of h5py need to read data counts as reading.  A figure is drawn for 16 cm and written as
-a PNG file in memory.  The script prints a line of a Markdown table, in seconds.
+Arguments with `=` are options of the analysis. Frames are read on demand; the time spent in
+functions of h5py counts as reading. The figure is drawn for 16 cm and written as a PNG file in
+memory. The times are printed in seconds, as a row of a Markdown table.
 """
 
 import io

@@ -1,8 +1,8 @@
-"""Measure response times and pictures per second of the laboratory in a browser: `make bench-lab`.
+"""Measure response times and frame rates of the laboratory in a browser: `make bench-lab`.
 
-Headless Chromium draws without a graphics card; a browser on a screen is therefore not slower.  The
-script fails if a measured value misses its goal, which is meaningful only if the computer executes
-no other program.
+Headless Chromium draws without a graphics card, so that a browser on a screen is not slower. The
+script fails if a measured value misses its goal, which is meaningful only on an otherwise idle
+computer.
 """
 
 import statistics
@@ -18,12 +18,12 @@ from browser import browsing
 
 LAB = Path(__file__).resolve().parents[1] / "post/lab.py"
 LONGEST = 20_000  # time limit of a measurement [ms]
-# In every document: time from the request of the page to the first motion of disks, in ms.
+# In every document: time from the request of the page to the first motion of disks [ms].
 OPENING = """if (top === window) requestAnimationFrame(function look(now) {
   try { if (filmOf(current()).inside().moment.time > 0) { window.moved = now; return; } } catch {}
   requestAnimationFrame(look);
 });"""
-# Time from the change of a value to a picture of disks that moved with the new value, in ms.
+# Time from the change of a value to a picture of disks that moved with the new value [ms].
 WAIT = """const [key, text, anew, longest] = arguments, box = current(), from = performance.now();
 const before = anew ? box.run : box.changes.length, seen = filmOf(box).inside;
 const isNew = () => anew
@@ -45,7 +45,7 @@ return new Promise(done => requestAnimationFrame(function look() {
 
 
 def opened(browser, address):
-    """Open the page after a pause, as a user would, and return the time until disks move [ms]."""
+    """Open the page after a pause, like a user, and return the time until disks move [ms]."""
     time.sleep(2)
     browser.open(address)
     for _ in range(LONGEST // 16):
@@ -56,7 +56,7 @@ def opened(browser, address):
 
 
 def measured(browser, address, repeats):
-    """A measured quantity, its goal, and whether smaller values are better."""
+    """Yield each measured quantity, its goal, and whether smaller values are better."""
     script = {"cmd": "Page.addScriptToEvaluateOnNewDocument", "params": {"source": OPENING}}
     browser.call("POST", "/goog/cdp/execute", script)
 

@@ -1,4 +1,4 @@
-"""A real browser for tests of pages: headless Chromium, controlled through chromedriver."""
+"""Browser for tests of pages: headless Chromium, controlled by chromedriver."""
 
 import contextlib
 import json
@@ -27,10 +27,10 @@ FLAGS = [
 
 
 class Browser:
-    """A session of chromedriver, which uses the protocol W3C WebDriver."""
+    """Session of chromedriver, by the W3C WebDriver protocol."""
 
     def __init__(self, port: int, profile: Path, size: tuple[int, int]) -> None:
-        """Start chromium with an empty profile."""
+        """Start Chromium with an empty profile."""
         self.root = f"http://127.0.0.1:{port}"
         arguments = [*FLAGS, f"--user-data-dir={profile}", f"--window-size={size[0]},{size[1]}"]
         wanted = {
@@ -80,9 +80,9 @@ class Browser:
         return self.call("POST", "/goog/cdp/execute", {"cmd": command, "params": params})
 
     def touch(self, *places: tuple[float, float], lifted: bool = True) -> None:
-        """Move a finger along a path in window coordinates, as on a screen that it can scroll.
+        """Move a finger along a path in window coordinates, as on a screen that can be scrolled.
 
-        A finger that rests before it is lifted leaves no motion of the page behind.
+        A finger that rests before it is lifted leaves the page without motion.
         """
         kinds = ["touchStart"] + ["touchMove"] * (len(places) - 1)
         for kind, (x, y) in zip(kinds, places, strict=True):
@@ -111,7 +111,7 @@ class Browser:
         self.call("POST", f"/element/{next(iter(self.element(name).values()))}/click", {})
 
     def on_stage(self, x: float, y: float) -> dict:
-        """Return driver coordinates of a position in CSS pixels from the corner of the stage."""
+        """Return driver coordinates of a position on the stage, from its corner [CSS pixels]."""
         box = self.run("return $('stage').getBoundingClientRect().toJSON()")
         place = {"x": round(x - box["width"] / 2), "y": round(y - box["height"] / 2)}
         return {"origin": self.element("stage"), **place}
@@ -129,7 +129,7 @@ class Browser:
         self.call("DELETE", "/actions")
 
     def wheel(self, x: float, y: float, steps: int) -> None:
-        """Turn the mouse wheel at a position of the stage."""
+        """Turn the mouse wheel at a position on the stage."""
         scroll = {"type": "scroll", "deltaX": 0, "deltaY": -100, **self.on_stage(x, y)}
         body = {"actions": [{"type": "wheel", "id": "wheel", "actions": [scroll] * steps}]}
         self.call("POST", "/actions", body)
@@ -146,7 +146,7 @@ class Browser:
 
 @contextlib.contextmanager
 def browsing(folder: Path, size: tuple[int, int] = (1300, 860)):
-    """Yield a browser with an empty profile, and end it with its driver."""
+    """Yield a browser with an empty profile, and end it together with its driver."""
     missing = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
     if missing:
         pytest.skip(f"no {' and no '.join(missing)} (Debian packages chromium, chromium-driver)")

@@ -1,4 +1,4 @@
-"""Fixtures of all tests: the program under test and functions that run it."""
+"""Fixtures of all tests: the program under test, and functions that run it."""
 
 import fcntl
 import hashlib
@@ -19,12 +19,12 @@ from processor_times import (  # noqa: F401 (pytest finds its hooks here)
 from signs_of_life import SignsOfLife
 from whole_runs import ran, within
 
-# Processes that a shell starts in the background ignore these signals by default.
+# Processes started by a shell in the background ignore these signals by default.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 ROOT = Path(__file__).resolve().parents[1]
-ROOM = 4e9  #: for the files of the tests [bytes]
+ROOM = 4e9  #: space for the files of the tests [bytes]
 
 
 @pytest.hookimpl(trylast=True)  # after the terminal reporter exists
@@ -33,12 +33,12 @@ def pytest_configure(config):
     terminal = config.pluginmanager.get_plugin("terminalreporter")
     if terminal and not hasattr(config, "workerinput"):
         config.pluginmanager.register(SignsOfLife(terminal))
-    memory = Path("/dev/shm")  # a slow disk then does not matter
+    memory = Path("/dev/shm")  # so that a slow disk does not matter
     if os.access(memory, os.W_OK):
         disk = os.statvfs(memory)
         if disk.f_bavail * disk.f_frsize > ROOM and not disk.f_flag & os.ST_NOEXEC:
             os.environ.setdefault("TMPDIR", str(memory))
-            tempfile.tempdir = None  # it is asked anew
+            tempfile.tempdir = None  # determined again
 
 
 def pytest_terminal_summary(terminalreporter, config):
@@ -52,7 +52,7 @@ def pytest_terminal_summary(terminalreporter, config):
 
 @pytest.fixture(scope="session")
 def program() -> Path:
-    """Return the path of the program (RICOCHET or build/ricochet); fail if it does not exist."""
+    """Return the path of the program (RICOCHET or build/ricochet); fail if there is none."""
     path = Path(os.environ.get("RICOCHET", ROOT / "build" / "ricochet")).resolve()
     if not os.access(path, os.X_OK):
         pytest.fail(f"no program at {path}: run make first, or set RICOCHET")
@@ -61,10 +61,10 @@ def program() -> Path:
 
 @pytest.fixture(scope="session")
 def made_once(tmp_path_factory) -> Callable[[str, Callable[[Path], object]], Path]:
-    """Return a function that makes a file once in a session, for all workers of pytest-xdist.
+    """Return a function that makes a file once per session, for all workers of pytest-xdist.
 
-    The function returns the path of the file that belongs to a text, and calls `make(path)` if the
-    file does not exist.  Tests must not change the file; a test that does so changes a copy.
+    It returns the path of the file that belongs to a text, calling `make(path)` if the file does
+    not exist. Tests must not change the file itself, but may change a copy.
     """
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "made_once"
@@ -85,7 +85,7 @@ def made_once(tmp_path_factory) -> Callable[[str, Callable[[Path], object]], Pat
 
 @pytest.fixture
 def ricochet(program, tmp_path) -> Callable[..., subprocess.CompletedProcess]:
-    """Return a function that runs the program in `tmp_path` and returns its status and output.
+    """Return a function that runs the program in `tmp_path`, and returns status and output.
 
     If `seconds` is given, the program is killed after this processor time.
     """
@@ -98,7 +98,7 @@ def ricochet(program, tmp_path) -> Callable[..., subprocess.CompletedProcess]:
 
 @pytest.fixture
 def started(program, tmp_path):
-    """Return a function that starts the program in `tmp_path`; running programs are ended."""
+    """Return a function that starts the program in `tmp_path`; programs still running are ended."""
     processes = []
 
     def start(*arguments, **options):
@@ -109,13 +109,13 @@ def started(program, tmp_path):
 
     yield start
     for process in processes:
-        with process:  # whose pipes are closed
+        with process:  # which also closes its pipes
             process.kill()
 
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """Return a function that makes a folder on a small disk; it requires the rights of root."""
+    """Return a function that makes a folder on a small disk, which requires root privileges."""
     folder = tmp_path / "disk"
     folder.mkdir()
     mounted = []

@@ -22,7 +22,7 @@ DRUM = """&box lower = -1.05, -1.05 upper = 1.05, 1.05 /
 
 
 def gas(count: int, eta: float = 0.1, mass: float = 1, name: str = "a") -> str:
-    """Return the group of a species that starts with equal speeds, so that all seeds share a kT."""
+    """Return a species with equal initial speeds, so that kT is the same for all seeds."""
     head = f"&species name = '{name}' count = {count} packing_fraction = {eta} mass = {mass}"
     return f"{head} speed = {np.sqrt(2 / mass)} /"
 
@@ -41,7 +41,7 @@ by_collisions = partial(text, unit="collisions_per_disk")
 
 
 def billiard(shift: float, seed: int) -> str:
-    """Return the input of a Sinai billiard, whose disk starts at a random position."""
+    """Return the input of a Sinai billiard, with a disk at a random initial position."""
     x, y, angle = np.random.default_rng(seed).uniform((0.02, 0.02, 0), (0.22, 0.98, 2 * np.pi))
     place, v = f"{x + shift:.17g}, {y:.17g}", f"{np.cos(angle):.17g}, {np.sin(angle):.17g}"
     disk = f"&species name = 'a' radius = 0.01 position = {place} velocity = {v} /"
@@ -50,7 +50,7 @@ def billiard(shift: float, seed: int) -> str:
 
 
 def crater(mass: float) -> str:
-    """Return the input of a projectile of a mass that digs a crater in 500 disks."""
+    """Return the input of a projectile of given mass that hits a bed of 500 disks."""
     bed = "&species name = 'bed' count = 500 packing_fraction = 0.5 region = 0, 1, 0, 0.5 /"
     hit = f"name = 'projectile' relative_to = 'bed' mass = {mass} radius = 2 position = 0.5, 0.75"
     contact = "&contact restitution = 0.5 contact_time = 1e-5 / &stop energy_fraction = 0.1 /"
@@ -59,7 +59,7 @@ def crater(mass: float) -> str:
 
 
 def hopper(width: float, grains: str) -> str:
-    """Return the input of a refilled hopper with a mouth of a width, and with 120 grains."""
+    """Return the input of a refilled hopper of 120 grains with a mouth of given width."""
     half, box = width / 2, "&box upper = 1, 2 gravity = 0, -1 /"
     walls = "".join(
         f"&wall name = '{name}' from = {end}, 0.6 to = {0.5 + sign * half}, {0.1 + half} /"
@@ -73,6 +73,6 @@ def hopper(width: float, grains: str) -> str:
 
 
 def grains(count: int, radius: float, name: str = "a", spread: float = 0.0) -> str:
-    """Return the group of a species of grains above the mouth of a hopper."""
+    """Return a species of grains above the mouth of a hopper."""
     head = f"&species name = '{name}' count = {count} radius = {radius} region = 0, 1, 0.6, 2"
     return f"{head} polydispersity = {spread} /" if spread else f"{head} /"

@@ -5,12 +5,12 @@
     python tests/coverage_tables.py --only gravity         repeats the rows of some systems
     python tests/coverage_tables.py --seeds 40 --print     prints less accurate tables
 
-The systems and the quantities were chosen before any system was simulated.  For each quantity, 100
-runs that differ only by their seed yield 100 confidence intervals.  The true value should be inside
-68 of the intervals, and 61 to 75 are allowed.  The true value is known exactly, or is the mean over
-all runs.  The p-values of valid runs should be uniformly distributed; the p-value of a
-Kolmogorov-Smirnov test of their uniformity must be at least 0.001.  The exit status is 0 if all
-systems have published rows and all rows are within these limits.
+Systems and quantities were chosen before any system was simulated. For each quantity, 100 runs that
+differ only in their seed yield 100 confidence intervals, 68 of which should contain the true value
+(61 to 75 are allowed). The true value is known exactly, or is the mean over all runs. The p-values
+of valid runs should be distributed uniformly: the p-value of a Kolmogorov-Smirnov test of their
+uniformity must be at least 0.001. The exit status is 0 if all systems have published rows within
+these limits.
 """
 
 import argparse
@@ -71,8 +71,9 @@ from validation import report  # noqa: E402
 
 SEEDS, P_SEEDS = 400, 200
 FIRST_SEED = 1001  # of the published tables
-Found = dict[str, tuple[float, float]]  # mean and error by quantity
-Input = str | Callable[[int], str]  # text of an input file, or a function of the seed
+Found = dict[str, tuple[float, float]]  # mean and error, by quantity
+# text of an input file, or a function that returns it for a seed
+Input = str | Callable[[int], str]
 
 
 # --- error bars ---
@@ -85,19 +86,19 @@ def of_rates(run: Run) -> Found:
 
 
 def of_fields(run: Run) -> Found:
-    """fields.py, in the cell in the middle."""
+    """fields.py, in the central cell."""
     found = fields.fields([run], None, (3, 3)).found
     return {name: (one.mean[4], one.error[4]) for name, one in found.items()}
 
 
 def of_stream(run: Run) -> Found:
-    """fields.py --grid: the flux between the centre of a drum and its wall."""
+    """fields.py --grid: flux between the centre of a drum and its wall."""
     psi = streams.stream_function([run], None, (3, 3)).middles
     return {"stream function": (psi.mean[4], psi.error[4])}
 
 
 def of_discharge(*runs: Run) -> Found:
-    """discharge.py: rate of one mouth, or constants of Beverloo's law from several mouths."""
+    """discharge.py: rate for one mouth, or constants of Beverloo's law for several mouths."""
     found = discharge.measured_rates(list(runs), 4)
     if fit := discharge.fit_of(found):
         return {name: tuple(map(float, one)) for name, one in fit.items()}
@@ -129,7 +130,7 @@ def of_mixture(run: Run) -> Found:
 
 
 def of_driven(show: str, run: Run) -> Found:
-    """driven.py, in the second half of the time."""
+    """driven.py, in the second half of the run."""
     quantity, found = driven.QUANTITIES[show], {}
     for name, curve in quantity.curves(run).items():
         half = driven.late(curve, quantity.compared)
@@ -175,7 +176,7 @@ def of_transport(run: Run) -> Found:
 
 
 def at(x: np.ndarray, curve: statistics.Estimate, place: float) -> tuple[float, float]:
-    """Return a point of a curve, with its error, at the same abscissa for all groups of runs."""
+    """Return a point of a curve with its error, at the same abscissa for all groups of runs."""
     mean, error = (float(np.interp(place, x, part)) for part in curve)
     return mean, error
 
@@ -215,7 +216,7 @@ def of_pairs(*runs: Run) -> Found:
 
 
 def of_missed(*runs: Run) -> Found:
-    """missed.py; the error of a single pair of runs follows from the fluctuations in time."""
+    """missed.py; the error of a single pair of runs is due to the fluctuations in time."""
     found = {}
     for name, some in (("pairs", runs), ("a pair", runs[:2])):
         row = missed.compare(list(some), None)[1]
@@ -224,7 +225,7 @@ def of_missed(*runs: Run) -> Found:
 
 
 def of_craters(*runs: Run) -> Found:
-    """crater_scan.py: sizes for the smallest mass, and exponents against the mass."""
+    """crater_scan.py: sizes for the smallest mass, and exponents of the mass."""
     points = [crater_scan.point(*one) for one in crater_scan.grouped(runs, crater_scan.key_of)]
     (curve,) = crater_scan.scanned(points)["mass"]
     found: Found = dict(curve[0].sizes)
@@ -242,9 +243,9 @@ def batched(runs: tuple[Run, ...], size: int) -> list[tuple[Run, ...]]:
 class Group(NamedTuple):
     """Runs from which a script calculates the measured quantities."""
 
-    inputs: tuple[Input, ...]  # of the runs of one seed
+    inputs: tuple[Input, ...]  # inputs of the runs with one seed
     of: Callable[..., Found]
-    seeds: int  # of a group
+    seeds: int  # number of seeds in a group
 
 
 #: For each system: the runs of a group, and a function that returns the quantities of a script.
@@ -320,12 +321,12 @@ BARS: dict[str, tuple[str, Callable[[Run], Found]]] = {
 class Pool(NamedTuple):
     """Runs of one input, from which groups are drawn with replacement.
 
-    The runs of a group are independent runs of the pool, and the true value is that of all runs.
+    The runs of a group are independent members of the pool, and the true value is that of all runs.
     """
 
     input: str
     runs: int
-    size: int  # of a group
+    size: int  # number of runs in a group
 
 
 FALL = (ROOT / "input" / "gravity.nml").read_text().replace("time = 100", "time = 12")
@@ -365,7 +366,7 @@ P_VALUES: dict[str, tuple[str, float]] = {
 
 
 def p_values(apart: float, run: Run) -> Found:
-    """Return KS and chi-square p-values of each species instead of mean and error."""
+    """Return the KS and chi-square p-values of each species in place of mean and error."""
     frames = td.frames_from(run, td.start_of_steady_state(run), apart)
     tests = {name: speed_laws.speed_test([run], [frames], name) for name in run.names}
     return {name: (test.ks_p, test.chi2_p) for name, test in tests.items()}
@@ -375,7 +376,7 @@ def p_values(apart: float, run: Run) -> Found:
 
 
 def energies(program: str, folder: str, given: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the energies (2, W) of the two species of a run in windows of time, and the times."""
+    """Return the energies (2, W) of two species in W time windows, and the times of the windows."""
     stem = Path(folder) / f"pool_{seed}"
     try:
         run = performed(program, stem, given, seed)
@@ -389,7 +390,7 @@ def energies(program: str, folder: str, given: str, seed: int) -> tuple[np.ndarr
 
 
 def drawn(found: np.ndarray, time: np.ndarray, size: int, groups: int) -> tuple[list[Found], float]:
-    """Return T_therm of groups of the runs, as equipartition.py determines it, and of all runs."""
+    """Return T_therm of groups of runs, by the method of equipartition.py, and of all runs."""
 
     def time_of(both: np.ndarray) -> float:
         return equipartition.entry(time, np.abs(both[1] / both[0] - 1))
@@ -405,7 +406,7 @@ def drawn(found: np.ndarray, time: np.ndarray, size: int, groups: int) -> tuple[
 def pool_of(
     program: str, folder: str, workers: ProcessPoolExecutor, given: str, runs: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the energies (R, 2, W) of the runs of a pool, and the times of the windows (W,)."""
+    """Return the energies (R, 2, W) of the runs of a pool, and the times (W,) of the windows."""
     seeds = range(FIRST_SEED, FIRST_SEED + runs)
     each = partial(energies, program, folder, given)
     found, times = zip(*workers.map(each, seeds, chunksize=16), strict=True)
@@ -445,13 +446,13 @@ def measured(program: str, folder: str, job: tuple) -> Found:
 
 
 def coverage(name: str, results: list[Found], exact: float | None = None) -> list[dict]:
-    """Return a row for each quantity of a system; `exact` is the true value if it is known."""
+    """Return a row for each quantity of a system; `exact` is the true value, if known."""
     rows = []
     for quantity in results[0]:
         mean, error = np.array([one.get(quantity, (np.nan, np.nan)) for one in results]).T
         some = np.isfinite(error)
         mean, error = mean[some], error[some]
-        if len(mean) < 10 or not error.any():  # exact values, such as kT of a fixed energy
+        if len(mean) < 10 or not error.any():  # exact values, such as kT at fixed energy
             continue
         truth = EXACT.get((name, quantity), float(mean.mean()) if exact is None else exact)
         three = mean[: len(mean) // 3 * 3].reshape(-1, 3)
@@ -479,9 +480,9 @@ def uniformity(name: str, results: list[Found]) -> list[dict]:
 
 
 def merged(tables: dict[str, list[dict]], path: Path) -> dict[str, list[dict]]:
-    """Return the tables with the rows of systems that were not repeated, in the order of the lists.
+    """Return the tables, in the order of the lists, with old rows for systems not repeated.
 
-    Published rows of systems that are no longer in the lists are left out.
+    Published rows of systems no longer in the lists are left out.
     """
     known = json.loads(path.read_text()) if path.exists() else {}
     for kind, systems in (("bars", BARS | GROUPS | POOLS), ("p_values", P_VALUES)):
@@ -494,7 +495,7 @@ def merged(tables: dict[str, list[dict]], path: Path) -> dict[str, list[dict]]:
 
 
 def unmeasured(tables: dict[str, list[dict]]) -> list[str]:
-    """Return the systems without a row in their table."""
+    """Return the systems that have no row in their table."""
     known = {kind: {row["system"] for row in rows} for kind, rows in tables.items()}
     return [
         f"{name}{end}"
@@ -508,7 +509,7 @@ def unmeasured(tables: dict[str, list[dict]]) -> list[str]:
 
 
 def misses(tables: dict[str, list[dict]]) -> list[str]:
-    """Return the quantities and species whose rows are outside of the limits."""
+    """Return the quantities and species whose rows are outside the limits."""
     bars = [row for row in tables["bars"] if not 61 <= row["held_%"] <= 75]
     uneven = [r for r in tables["p_values"] if min(r["ks_uniform"], r["chi2_uniform"]) <= 1e-3]
     named = [f"{row['system']}: {row['quantity']}" for row in bars]

@@ -1,10 +1,10 @@
-"""Test mutants, which are copies of the project with one fault in a source.
+"""Test mutants, copies of the project with one fault in a source.
 
-`mutants.py` and `random_mutants.py` use this module.  Every test runs up to its first failure.  The
-tests that the page of the folder names for the changed source run first, because they detect most
-faults.  All programs and libraries have run-time checks (the build of the unit tests), because this
-build takes seconds after a change.  A test of pytest detects a fault only if it fails twice, and
-passes without the fault.
+Used by `mutants.py` and `random_mutants.py`. Tests run up to the first failure, beginning with
+those that the page of the folder names for the changed source, because they detect most faults. All
+programs and libraries have run-time checks (the build of the unit tests), because this build takes
+only seconds after a change. A test of pytest detects a fault only if it fails twice, and passes
+without the fault.
 """
 
 import os
@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent / "support"))
 from protecting_tests import protecting_tests
 
 ROOT = Path(__file__).resolve().parents[1]
-#: Variables of `make checked`. With any others it would compile everything again.
+#: Variables of `make checked`; any others would cause a complete rebuild.
 UNIT_BUILD = re.findall(r"^unit_build := (.*)", (ROOT / "Makefile").read_text(), re.MULTILINE)[0]
 UNIT_BUILD = UNIT_BUILD.replace("$(BUILD)", "build")
 #: Limits of a command [s of wall time] and of each process [s of processor time].
@@ -29,7 +29,7 @@ PYTEST = "timeout 3600 prlimit --cpu=400 .venv/bin/python -m pytest -q -p no:ran
 UNITS = "OMP_WAIT_POLICY=passive prlimit --cpu=300 --as=8000000000 $RICOCHET_LIBRARY/unit_tests"
 IMPORTS = re.compile(r"^from ricochet[\w.]* import (?:\([^)]*\)|.*)", re.MULTILINE)
 FAILURE = re.compile(r"^(?:Failure in: |FAILED |ERROR |unit tests: )(.*?)(?: - .*)?$", re.MULTILINE)
-#: The tests with the mark `statistics` that run the program, and those that run the package.
+#: Tests with the mark `statistics` that run the program, and those that run the package.
 LOST_OF_PROGRAM = "-m statistics tests/validation tests/runs tests/post/test_lab_runs.py"
 LOST_OF_PACKAGE = "-m statistics tests/post tests/runs/test_pages.py tests/runs/test_docs.py"
 
@@ -39,9 +39,9 @@ def git(*arguments: str, folder: Path = ROOT) -> str:
 
 
 class Bench:
-    """A copy of the project at a commit, in which mutants are built and tested.
+    """Copy of the project at a commit, in which mutants are built and tested.
 
-    Methods that run tests return the names of failed tests, and an empty list if all tests pass.
+    Methods that run tests return the names of failed tests; the list is empty if all tests pass.
     """
 
     def __init__(self, folder: Path, commit: str, jobs: int):
@@ -65,7 +65,7 @@ class Bench:
 
     @contextmanager
     def changed(self, file: str, text: str) -> Iterator[None]:
-        """Give a file another text meanwhile."""
+        """Temporarily replace the text of a file."""
         path = self.tree / file
         before = path.read_text()
         path.write_text(text)
@@ -113,7 +113,7 @@ class Bench:
         return []
 
     def first(self, file: str) -> list[str]:
-        """Run the kept tests that are most likely to detect a fault in a file."""
+        """Run those of the kept tests that most likely detect a fault in a file."""
         names = protecting_tests(self.tree).get(file, [])
         units = [name for name in names if name.endswith(".pf")]
         runs = [f"tests/*/{name}" for name in names if name.endswith(".py")]
@@ -122,7 +122,7 @@ class Bench:
         return (self.units(units) if units else []) or (self.pytest(" ".join(runs)) if runs else [])
 
     def users(self, file: str) -> Iterator[str]:
-        """Return the tests that have the name of a module, or import it or a part of it.
+        """Yield the tests that are named like a module, or import it or a part of it.
 
         The examples in docstrings are tests of all modules.
         """

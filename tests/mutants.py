@@ -1,27 +1,29 @@
-"""Mutation test: introduce faults one at a time and report which test detects each of them.
+"""Mutation test: introduce faults one at a time, and report which test detects each of them.
 
     python tests/mutants.py [NAME...] [--jobs 2] [--commit HEAD]
     python tests/mutants.py --check
 
-The test works in build/mutants, on a copy of the last commit.  A repeated call continues an
-interrupted test, because the file `results` in this folder contains a line for each tested mutant
-(source with one fault) of each commit.  For each mutant, the tests of `make test` are executed up
-to the first failure, as `mutant_bench.py` describes.  Most mutants take half a minute; a mutant
-that no test detects takes as long as `make test`.  With `--check` the script only checks that each
-text to be replaced occurs exactly once.
+The test works on a copy of the last commit in build/mutants. A repeated call continues an
+interrupted test, because the file `results` in this folder has a line for each mutant (source with
+one fault) tested at each commit. For each mutant, the tests of `make test` run up to the first
+failure, as described in `mutant_bench.py`. Most mutants take half a minute; one that no test
+detects takes as long as `make test`. `--check` only checks that each text to be replaced occurs
+exactly once.
 
-The file mutants.diff describes each fault by a sentence and by a change of the present sources.  If
-the sources are rewritten, the sentence is kept and the change is expressed in the new sources.
-Earlier changes are in the history of mutants.diff, and can be tested in a clone at an old commit.
+The file mutants.diff describes each fault by a sentence and by a change of the present sources.
+When the sources are rewritten, the sentence stays and the change is adapted. Earlier changes are in
+the history of mutants.diff, and can be tested in a clone at an old commit.
 
 The 24 faults were drawn from commit 67f9503 by `random.Random(20261124)`: two from each folder of
-src/, one from run.f90, and three from post/.  Each draw selects a kind of fault, a line of the
-folder to which this kind can be applied, and a place in the line.  The kinds of faults are a wrong
-sign; another comparison, or another of `.and.`, `.not.` and `min`; a missing line that changes the
-state; and a number or an index that is wrong by one.  From twenty draws for each folder, the first
-draws on different subjects were used.  Faults were not used if they change no result, if they only
-change the computing time, if every run of the program would reveal them, if their effect depends on
-the compiler (access beyond an array), or if they are in code that was to be removed.
+src/, one from run.f90, and three from post/. Each draw selects a kind of fault, a line of the
+folder to which it can be applied, and a place in the line. The kinds are a wrong sign; another
+comparison, or another of `.and.`, `.not.` and `min`; a missing line that changes the state; and a
+number or index that is off by one. Of twenty draws for each folder, the first on different subjects
+were used.
+
+Faults were discarded if they change no result or only the computing time, if every run of the
+program would reveal them, if their effect depends on the compiler (access beyond an array), or if
+they are in code that was to be removed.
 """
 
 import argparse
@@ -37,7 +39,7 @@ MUTANT = re.compile(r"^([\w-]+): .*\n--- (.*)\n((?:.*\n)+?)(?=\n[\w-]+: |\Z)", r
 
 
 class Mutant(NamedTuple):
-    """A text in a file and its replacement."""
+    """Text in a file, and its replacement."""
 
     file: str
     old: str

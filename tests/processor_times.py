@@ -1,7 +1,7 @@
-"""Hooks of pytest that measure the processor time of each test and list the slowest tests.
+"""Hooks of pytest that measure the processor time of each test and list the slowest ones.
 
-The time of a test contains that of its fixtures and of all processes that they start.  Unlike the
-time on the clock, it hardly depends on other programs that run at the same time.
+The time of a test includes its fixtures and all processes that they start. Unlike wall time, it
+hardly depends on other programs running at the same time.
 """
 
 import contextlib
@@ -12,13 +12,13 @@ import pytest
 
 from whole_runs import facts_of
 
-#: Number of tests that are listed.
+#: Number of tests in the list.
 SHOWN = int(os.environ.get("SLOWEST", "10"))
 BEGAN = pytest.StashKey[float]()
 
 
 def living_descendants() -> list[list[str]]:
-    """Return data about all running processes that this process has started, directly or not."""
+    """Return data about all running descendants of this process."""
     facts, family = {}, {os.getpid()}
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):  # the process has ended meanwhile
@@ -32,7 +32,7 @@ def living_descendants() -> list[list[str]]:
 
 
 def has_children() -> bool:
-    """Return whether a child process exists; this is quicker than a look at all processes."""
+    """Return whether a child process exists, which is quicker than examining all processes."""
     try:
         os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
     except ChildProcessError:
@@ -41,7 +41,7 @@ def has_children() -> bool:
 
 
 def processor_time() -> float:
-    """Return the processor time of this process and all its descendants, also ended ones [s]."""
+    """Return the processor time of this process and all descendants, also ended ones [s]."""
     living = living_descendants() if has_children() else []
     ticks = sum(int(ticks) for fields in living for ticks in fields[11:15])
     return sum(os.times()[:4]) + ticks / os.sysconf("SC_CLK_TCK")
@@ -65,7 +65,7 @@ def slowest_tests(reports) -> list[str]:
     known = [(dict(report.user_properties).get("processor_time"), report.nodeid)
              for report in reports]  # fmt: skip
     times = sorted(((used, name) for used, name in known if used is not None), reverse=True)
-    if len(times) <= 10:  # the developer runs a few tests
+    if len(times) <= 10:  # the developer runs only a few tests
         return []
     whole = sum(used for used, _ in times)
     title = f"slowest of {len(times)} tests, which used {whole:.0f} s of processor time:"

@@ -2,13 +2,13 @@
 
     python tests/random_mutants.py [--seed 1] [--count 40] [--jobs 2] [--draw] [--rest]
 
-A mutant is a copy of the sources with one fault.  The script draws lines of code uniformly from the
-Fortran files of src/ and the Python files of post/ricochet/, and changes an operator, comparison,
-number, logical value or condition of each line, or deletes the statement.  Draws of lines that are
-not code, and of mutants that do not compile, are repeated.  With `--draw` the mutants are only
+A mutant is a copy of the sources with one fault. Lines of code are drawn uniformly from the Fortran
+files of src/ and the Python files of post/ricochet/. In each of them an operator, comparison,
+number, logical value or condition is changed, or the statement is deleted. Draws of lines that are
+not code, and of mutants that do not compile, are repeated. With `--draw` the mutants are only
 printed.
 
-Each mutant runs against two sets of tests, up to the first failure:
+Each mutant is tested with two sets of tests, up to the first failure:
 
 kept
     the tests of `make test`: the unit tests, and all tests of pytest without a mark
@@ -16,15 +16,14 @@ lost
     the tests that `make test` leaves out: the unit tests with all random cases (THOROUGH=1), and
     tests with the mark `statistics`
 
-`mutant_bench.py` describes the order of the tests.  If the first tests detect a fault, it is a
-fault that kept tests detect, and nothing else runs.  Otherwise the lost tests run.  If the lost
-tests pass, the fault cannot be detected by them alone; then the remaining kept tests run only with
-`--rest`.  If the lost tests fail, the remaining kept tests run, too.
+Tests run in the order described in `mutant_bench.py`. A fault detected by the first of the kept
+tests is settled. Otherwise the lost tests run. If they fail, the remaining kept tests run as well;
+if they pass, so that the fault is not one that only they detect, these run only with `--rest`.
 
-The script returns 1 if a fault is detected by lost tests alone.  Lost tests that use no program do
-not run for mutants of Fortran files.  The script works in build/random_mutants, on a copy of the
-last commit.  A repeated call continues an interrupted one, because the file `results` contains a
-line for each tested mutant of each commit.
+The exit status is 1 if a fault is detected by lost tests alone. Lost tests that do not use the
+program are not run for mutants of Fortran files. The script works on a copy of the last commit in
+build/random_mutants. A repeated call continues an interrupted one, because the file `results` has a
+line for each mutant tested at each commit.
 """
 
 import argparse
@@ -41,7 +40,7 @@ from mutant_bench import ROOT, Bench, git
 
 SCRATCH = ROOT / "build" / "random_mutants"
 FOLDERS = {"src": ".f90", "post/ricochet": ".py"}
-#: Replacements of a piece of code; the first group of a pattern is replaced.
+#: Replacements of a piece of code, the first group of a pattern.
 SWAPS = [
     (r"(?<![*+\-/=<>(,e.] )(?<=[\w)\] ])(\+)(?=[ \w(])", "-"),
     (r"(?<=[\w)\]]) ?(-) ?(?=[\w(])", "+"),
@@ -70,7 +69,7 @@ STATEMENT = re.compile(
 
 
 class Mutant(NamedTuple):
-    """A line of a file and its replacement."""
+    """Line of a file, and its replacement."""
 
     file: str
     line: int
@@ -83,7 +82,7 @@ class Mutant(NamedTuple):
 
 
 def swapped(line: str, code: str, swaps: list[tuple[str, str]]) -> Iterator[str]:
-    """Return the line with each possible replacement; `code` is the line with strings blanked."""
+    """Yield the line with each possible replacement; `code` is the line with strings blanked."""
     for pattern, new in swaps:
         for found in re.finditer(pattern, code):
             yield line[: found.start(1)] + new + line[found.end(1) :]
@@ -153,7 +152,7 @@ def compiles(text: str) -> bool:
 
 
 def drawn(rng: random.Random, files: dict[str, list[str]]) -> Mutant | None:
-    """Return a random mutant of a line drawn uniformly, or nothing if it is not code."""
+    """Return a random mutant of a line drawn uniformly, or None if it is not code."""
     k = rng.randrange(sum(map(len, files.values())))
     for name, lines in files.items():
         if k < len(lines):

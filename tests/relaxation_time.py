@@ -1,12 +1,12 @@
-"""Draw how a melting crystal reaches equilibrium: event chains against event-driven dynamics.
+"""Plot how a melting crystal reaches equilibrium: event chains against event-driven dynamics.
 
     python tests/relaxation_time.py [docs/explanation/event_chains.png]
 
-All runs start from the same lattice of 256 disks at packing 0.702, where the equilibrium is a
-liquid with large ordered patches.  The figure shows the global bond-orientational order, averaged
-over runs with different seeds, against the number of events per disk: displacements of a disk in
-event chains (placement = 'relaxed'), or collisions of a disk in a run from placement = 'lattice'.
-The program is build/ricochet, or that named by the variable RICOCHET.
+All runs start from the same lattice of 256 disks at a packing fraction of 0.702, where the
+equilibrium is a liquid with large ordered regions. The figure shows the global bond-orientational
+order, averaged over runs with different seeds, against the number of events per disk: displacements
+in event chains (placement = 'relaxed'), or collisions in a run that starts with
+placement = 'lattice'. The program is build/ricochet, or the one that the variable RICOCHET names.
 """
 
 import os
@@ -30,7 +30,7 @@ TAUS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000)
 
 
 def run_of(folder: Path, seed: int, **species) -> Run:
-    """Perform a run and return its output."""
+    """Execute a run and return its output."""
     groups = {"run": {"seed": seed}, "box": {"boundary": ("periodic", "periodic")}}
     groups["species"] = {"count": COUNT, "packing_fraction": PACKING, "temperature": 1.0} | species
     relaxed = "relaxation_sweeps" in species
@@ -46,12 +46,12 @@ def run_of(folder: Path, seed: int, **species) -> Run:
 
 
 def order(run: Run, frame: int) -> float:
-    """Return the modulus of the mean of psi6 in one frame."""
+    """Return the modulus of the mean psi6 in one frame."""
     return abs(bond_order(run, frame).mean())
 
 
 def measure(folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return the order for each seed and each number of sweeps, and of events per disk."""
+    """Return the order for each seed and number of sweeps, or of collisions per disk."""
     chains = [
         [order(run_of(folder, s, placement="relaxed", relaxation_sweeps=n), 0) for n in SWEEPS]
         for s in SEEDS

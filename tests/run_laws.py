@@ -1,7 +1,7 @@
-"""Laws that hold for every run and input, tested with the content of the output file.
+"""Laws that hold for every run and input, tested with the contents of the output file.
 
-`found` is what `whole_runs.contents` gives. Each law says how far a run is from it, in parts of
-what rounding leaves: below 1 it holds.
+`found` is the result of `whole_runs.contents`. Each law yields a deviation, in units of the allowed
+rounding error; it holds if the deviation is below 1.
 """
 
 from collections.abc import Iterator
@@ -12,14 +12,14 @@ from scipy.spatial import cKDTree
 BALANCE = 1e-12  #: relative to the energy, the losses and the energy supplied
 MOMENTUM = 1e-12  #: relative to the sum of m |v| over all disks
 GAP = 1e-9  #: relative to the contact distance
-PLACE = 1e-12  #: rounding error of positions relative to the largest coordinate
+PLACE = 1e-12  #: rounding error of positions, relative to the largest coordinate
 SIDES = ("left", "right", "bottom", "top")
 
 Found = dict[str, np.ndarray]
 
 
 def laws_broken(found: Found) -> Iterator[str]:
-    """Return each law that is violated, with the size of the violation."""
+    """Yield each violated law with the size of the violation."""
     laws = {
         "energy": imbalance(found) / BALANCE,
         "momentum": momentum_drift(found) / MOMENTUM,
@@ -33,12 +33,12 @@ def laws_broken(found: Found) -> Iterator[str]:
 
 
 def series(found: Found, name: str) -> np.ndarray:
-    """Return all samples of an observable; empty if the file does not contain it."""
+    """Return all samples of an observable, none if it is not in the file."""
     return found.get(f"/observables/{name}/value", np.empty(0))
 
 
 def of_box(found: Found) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return lower corner, edges, and whether axes are periodic."""
+    """Return lower corner, edge lengths, and whether the axes are periodic."""
     box = "/particles/disks/box"
     return found[f"{box}/lower"], found[f"{box}/edges"], found[f"{box}@boundary"] == b"periodic"
 
@@ -49,10 +49,11 @@ def is_open(found: Found) -> bool:
 
 
 def imbalance(found: Found) -> float:
-    """Return the error of the energy balance relative to its largest term.
+    """Return the error of the energy balance, relative to its largest term.
 
-    Terms that cancel count in full: kinetic and potential energy, kicks of noise whose momentum is
-    taken back, and the kT that a thermal wall gives at one hit and may take back at the next.
+    Terms that cancel count in full: kinetic and potential energy, noise kicks whose momentum is
+    removed again, and the kT that a thermal wall transfers in one collision and may take back in
+    the next.
     """
     signs = {"total_energy": 1, "dissipated_energy": 1, "heat": -1, "work": -1, "drive_energy": -1}
     signs |= {"outflow_energy": 1, "inflow_energy": -1}
@@ -87,7 +88,7 @@ def momentum_drift(found: Found) -> float:
 
 
 def depth(found: Found) -> float:
-    """Return the largest overlap of disks and walls; 0 if time steps allow overlaps."""
+    """Return the largest overlap of disks and walls, or 0 if time steps allow overlaps."""
     if found["/parameters/run@dynamics"] == b"steps":
         return 0.0
     places = found["/particles/disks/position/value"]
@@ -103,19 +104,19 @@ def depth(found: Found) -> float:
 
 
 def of_present(found: Found, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the radii and positions of the disks that are in the box."""
+    """Return radii and positions of the disks in the box."""
     inside = np.isfinite(place[:, 0])
     return found["/particles/disks/radius"][inside], place[inside]
 
 
 def has_lid(found: Found, side: str) -> bool:
-    """Return whether a side is open, or may be open after a change."""
+    """Return whether a side is open, or may be opened by a change."""
     is_open = found.get(f"/parameters/side/{side}@open", 0)
     return bool(is_open) or f"{side}.open=".encode() in bytes(found.get("/parameters/changes", b""))
 
 
 def pair_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
-    """Return the gaps of close pairs, each found from its larger disk, and contact distances."""
+    """Yield gaps and contact distances of close pairs, each found from its larger disk."""
     lower, edges, periodic = of_box(found)
     radius, place = of_present(found, place)
     if not len(place):
@@ -143,7 +144,7 @@ def pair_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
 
 
 def wall_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
-    """Return the gaps of all disks to each wall, and their radii."""
+    """Yield the gaps of all disks to each wall, and their radii."""
     lower, edges, periodic = of_box(found)
     radius, place = of_present(found, place)
     for k, name in enumerate(SIDES):
@@ -175,7 +176,7 @@ def wall_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
 
 
 def angles_of(found: Found) -> np.ndarray:
-    """Return the angles (groups, 2) of the arc of each group of obstacles; NaN for circles."""
+    """Return the angles (groups, 2) of the arc in each group of obstacles; NaN for circles."""
     none = np.full(len(found.get("/parameters/obstacle/inside", ())), np.nan)
     names = ("from_angle", "to_angle")
     return np.stack([found.get(f"/parameters/obstacle/{name}", none) for name in names], axis=1)
@@ -191,9 +192,9 @@ def from_arc(away: np.ndarray, size: float, first: float, last: float) -> np.nda
 
 
 def rows_of(found: Found, kind: str, *names: str) -> tuple[list, np.ndarray]:
-    """Return values of all circles or straight walls, and the group number (from 0) of each.
+    """Return values of all circles or straight walls, and the index of the group of each.
 
-    They stand in a table of their own where a group has more than one.
+    If a group has several of them, the values are in a separate table.
     """
     table = f"/parameters/{kind}_rows"
     if f"{table}/group" in found:
@@ -234,7 +235,7 @@ def shift_of(found: Found, side: str, time: float) -> float:
 
 
 def log_error(found: Found) -> float:
-    """Return the differences of the log from counts and sums for each disk and each wall."""
+    """Return the deviation of the log from counts and sums for each disk and each wall."""
     if "/events/j" not in found:
         return 0.0
     i, j = found["/events/i"], found["/events/j"]
@@ -242,7 +243,8 @@ def log_error(found: Found) -> float:
     code = -len(SIDES)
     for kind, place in (("obstacle", "centre"), ("wall", "from")):
         names = found.get(f"/parameters/{kind}/name", ())
-        for group in rows_of(found, kind, place)[1]:  # several rows have one code each, and one sum
+        # several rows have one boundary id each, and a common sum
+        for group in rows_of(found, kind, place)[1]:
             codes.setdefault(f"obstacles/{names[group].decode()}", []).append(code)
             code -= 1
     change = found["/events/momentum_change"]
@@ -265,7 +267,7 @@ def log_error(found: Found) -> float:
 
 
 def observable_error(found: Found) -> float:
-    """Return the differences of the final observables from values computed with the last frame."""
+    """Return the deviation of the final observables from values computed with the last frame."""
     v, mass = found["/particles/disks/velocity/value"][-1], found["/particles/disks/mass"]
     inside = np.isfinite(v[:, 0])
     if v.dtype != np.float64 or not inside.any():

@@ -1,4 +1,4 @@
-"""A plugin of pytest that prints the elapsed time whenever no test has ended for some seconds."""
+"""Plugin of pytest that prints the elapsed time whenever no test has ended for several seconds."""
 
 import threading
 import time
@@ -8,10 +8,10 @@ SILENCE = 8.0
 
 
 class SignsOfLife:
-    """Writes the elapsed time to the line of dots, from a thread of the main process."""
+    """Writes the elapsed time into the line of dots, from a thread of the main process."""
 
     def __init__(self, terminal):
-        """Take the reporter that writes to the terminal."""
+        """Store the reporter that writes to the terminal."""
         self.write = terminal.write
         self.ended = threading.Event()
         self.began = self.last = time.monotonic()

@@ -1,13 +1,13 @@
-"""A substitute for the commands of Slurm, with which `ensemble.sh --engine slurm` runs anywhere."""
+"""Substitute for the commands of Slurm, with which `ensemble.sh --engine slurm` runs anywhere."""
 
 import os
 from pathlib import Path
 
 from whole_runs import executable
 
-#: The cluster runs the tasks of an array one after the other, but reports all tasks as running at
-#: the same time.  As in Slurm, the job number of the last task is that of the array, and `squeue`
-#: prints a line for each task of the array that is asked for.
+#: The tasks of an array run one after the other, but all are reported as running at the same time.
+#: As in Slurm, the job number of the last task is that of the array, and `squeue` prints a line for
+#: each requested task of the array.
 COMMANDS = {
     "sbatch": """echo 1 >>"$LAB/jobs"
 for word; do
@@ -42,7 +42,7 @@ done
 
 
 def slurm_surroundings(folder: Path) -> dict[str, str]:
-    """Write the commands into a folder; return the environment variables that lead to them."""
+    """Write the commands to a folder; return the environment variables that select them."""
     (folder / "bin").mkdir()
     for name, text in COMMANDS.items():
         executable(folder / "bin" / name, text, "bash")

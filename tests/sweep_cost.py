@@ -1,10 +1,10 @@
-"""Measure what a sweep of many small members costs besides the runs themselves.
+"""Measure the cost of a sweep of many small member runs, apart from the runs themselves.
 
-    python tests/sweep_cost.py [N]          N members, up to 100 000 [10 000]
+    python tests/sweep_cost.py [N]          N member runs, up to 100 000 [10 000]
 
-It prints a table of wall-clock times and processor times.  Each member is a file of a real small
-run, which is computed ten times and linked under the names of all members; Slurm is a substitute
-that runs nothing.  The commands are those of runs/ensemble.sh and post/gather.py.
+A table of wall times and processor times is printed. The file of each member run is a link to one
+of ten files of a real small run. Slurm is replaced by a substitute that runs nothing. The commands
+are those of runs/ensemble.sh and post/gather.py.
 """
 
 import argparse
@@ -40,7 +40,7 @@ def measured(name: str, command: list[object], codes: set[int], env: Mapping[str
 
 
 def link_members(folder: Path, program: str, n: int, env: Mapping[str, str]) -> None:
-    """Make the files of all members: links to a few files, written after the input."""
+    """Make the files of all member runs: links to a few files, written after the input."""
     names = [folder / f"original_{k}" for k in range(ORIGINALS)]
     for name in names:
         command = [program, folder / "input.nml", "-o", f"{name}.h5", "--quiet"]

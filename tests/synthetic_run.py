@@ -1,4 +1,4 @@
-"""Write small HDF5 files in the layout of a Ricochet run for tests of the post-processing."""
+"""Write small HDF5 files in the layout of a Ricochet run, for tests of the post-processing."""
 
 import csv
 import importlib
@@ -19,7 +19,7 @@ from ricochet.figures.drawing import plt, save
 from ricochet.script import launch
 
 ROOT = Path(__file__).resolve().parents[1]
-#: Scripts that read runs; the laboratory makes runs.
+#: Scripts that read runs (the laboratory makes runs instead).
 SCRIPTS = sorted(
     path.stem
     for path in (ROOT / "post").glob("*.py")
@@ -55,7 +55,7 @@ def write_run(
     provenance=None,
     committed=None,
 ):
-    """Write a run with `position` and `velocity` (T, N, 2); `observables` name -> (T', ...)."""
+    """Write a run with `position` and `velocity` (T, N, 2), and `observables` by name (T', ...)."""
     position, velocity = np.asarray(position, float), np.asarray(velocity, float)
     frames, count = position.shape[:2]
     time = np.arange(frames, dtype=float) if time is None else np.asarray(time, float)
@@ -98,14 +98,14 @@ def written(path, position, velocity, **options):
 
 
 def add_element(group, name, time, value):
-    """An H5MD element: step, time, value."""
+    """Add an H5MD element with step, time and value."""
     element = group.create_group(name)
     element["step"], element["time"] = np.arange(len(time)), np.asarray(time, float)
     element["value"] = value
 
 
 def write_observables(file, time, observables):
-    """Write observables that share their sample times."""
+    """Write observables that share their sampling times."""
     group = file.create_group("observables")
     for name, value in {"dissipated_energy": np.zeros(len(time)), **observables}.items():
         add_element(group, name, time, np.asarray(value))
@@ -113,7 +113,7 @@ def write_observables(file, time, observables):
 
 
 def write_parameters(file, parameters, names, species, obstacles, walls):
-    """`parameters` as group -> variable -> value; a species is the group species/NAME."""
+    """Write `parameters`, by group and variable; each species is a group species/NAME."""
     root = file.create_group("parameters")
     root["input"] = text("&run\n/\n")
     for group, variables in (parameters or {}).items():
@@ -139,7 +139,7 @@ def maxwell_velocities(rng, frames, count, temperature=1.0, mass=1.0):
 
 
 def save_at_once(figure, *more):
-    """Save a figure without the layout, which takes a quarter of the time of a script.
+    """Save a figure without a layout, which takes a quarter of the time of a script.
 
     With THOROUGH, and in tests that draw figures themselves, figures have their layout.
     """
@@ -149,7 +149,7 @@ def save_at_once(figure, *more):
 
 
 def run_script(name, *arguments):
-    """Run post/NAME.py as from the command line, in this process; returns the exit code.
+    """Run post/NAME.py in this process, as from the command line; return the exit code.
 
     Warnings are errors.
     """
@@ -183,7 +183,7 @@ def refusal(capsys, script, *arguments, code=2):
 
 
 def drawn(folder, script, *arguments):
-    """Run a script that draws and writes its table; return the rows of the table."""
+    """Run a script that draws a figure and writes its table; return the rows of the table."""
     figure, table = folder / f"{script}.png", folder / f"{script}.csv"
     assert run_script(script, *arguments, "-o", figure, "--csv", table) == 0
     assert figure.stat().st_size > 10000
@@ -192,6 +192,6 @@ def drawn(folder, script, *arguments):
 
 
 def still_run(path, position, **more):
-    """Write a run with disks at rest at the given positions of each frame."""
+    """Write a run with disks at rest at the given positions in each frame."""
     observables = {"collisions": np.zeros(len(position))}
     return write_run(path, position, np.zeros_like(position), observables=observables, **more)

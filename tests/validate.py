@@ -1,11 +1,11 @@
-"""Validate the physics: run the program on every case and compare with the references.
+"""Validate the physics: run the program on every case, and compare with the references.
 
     python tests/validate.py                    all cases
     python tests/validate.py P4 P7-01           cases whose names begin with P4 or P7-01
     python tests/validate.py --seed-shift 100   the same with other random numbers
 
-The program is build/ricochet, or that named by the variable RICOCHET.  Exit codes: 0 all pass,
-1 some fail, 2 wrong usage.
+The program is build/ricochet, or the one that the variable RICOCHET names. Exit codes: 0 all cases
+pass, 1 some fail, 2 wrong usage.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Tools of the tests of whole runs: inputs, and functions that compare output files."""
+"""Tools for tests of whole runs: inputs, and functions that compare output files."""
 
 import contextlib
 import os
@@ -14,7 +14,8 @@ import numpy as np
 
 FINISHED, USAGE, FILES, BROKEN, STOPPED = 0, 2, 3, 4, 75
 
-#: A little of everything: two species, walls that take energy, frames and observables apart.
+#: A system with many features: two species, dissipating walls, separate schedules of frames and
+#: observables.
 MIXTURE = """&run title = 'mixture' seed = 5 /
 &species name = 'light' count = 60 radius = 0.02 temperature = 1 /
 &species name = 'heavy' count = 20 radius = 0.03 mass = 4 temperature = 1 /
@@ -25,7 +26,7 @@ MIXTURE = """&run title = 'mixture' seed = 5 /
 
 
 def contents(path) -> dict[str, np.ndarray]:
-    """All that an output file says: datasets by path, attributes by path@name."""
+    """Return all contents of an output file: datasets by path, attributes by path@name."""
     found = {}
 
     def visit(name, item):
@@ -34,7 +35,7 @@ def contents(path) -> dict[str, np.ndarray]:
             found[f"{name}@{attribute.name.decode()}"] = read(attribute)
         if isinstance(item, h5py.h5d.DatasetID):
             found[name] = read(item, h5py.h5s.ALL, h5py.h5s.ALL)
-        else:  # also by second names
+        else:  # including second names
             for key in item:
                 visit(f"{name}/{key.decode()}", h5py.h5o.open(item, key))
 
@@ -50,12 +51,15 @@ def contents(path) -> dict[str, np.ndarray]:
 
 
 def differences(one, other) -> list[str]:
-    """Names of what is not the same, bit for bit, in two output files; their origin aside."""
+    """Return the names of all items, except their origin, that differ between two output files."""
     return unlike(contents(one), contents(other))
 
 
 def unlike(a: dict, b: dict) -> list[str]:
-    """The same for what two files contain. The checksum of their inputs is left to these."""
+    """Return the names of the items that differ between the contents of two files.
+
+    The checksum of the input is ignored.
+    """
     return [
         name
         for name in sorted(a.keys() | b.keys())
@@ -65,13 +69,13 @@ def unlike(a: dict, b: dict) -> list[str]:
 
 
 def same(a, b) -> bool:
-    """Equal in type, shape and every bit."""
+    """Return whether two arrays agree in type, shape and every bit."""
     a, b = np.asarray(a), np.asarray(b)
     return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
 def committed(path) -> dict[str, np.ndarray]:
-    """Frames and observables of a file that may still be written, as far as they are committed."""
+    """Return the committed frames and observables of a file that may still be written to."""
     found = {}
     with h5py.File(path, "r", locking=False) as file:
         for root in ("particles/disks", "observables"):
@@ -84,12 +88,12 @@ def committed(path) -> dict[str, np.ndarray]:
 
 
 def is_beginning(part: dict, whole: dict) -> list[str]:
-    """Names in `part` that are not the first samples of the same in `whole`."""
+    """Return the names in `part` that are not the first samples of the same item in `whole`."""
     return [name for name in part if not same(part[name], whole[name][: len(part[name])])]
 
 
 def one_line(run) -> str:
-    """The message of a run that failed: a single line, and no trace of a library."""
+    """Return the message of a run that failed, a single line without traces of a library."""
     lines = run.stderr.splitlines()
     assert len(lines) == 1, run.stderr
     assert "HDF5-DIAG" not in run.stderr and "Fortran runtime" not in run.stderr
@@ -97,14 +101,14 @@ def one_line(run) -> str:
 
 
 def write_input(folder, text=MIXTURE, name="gas.nml") -> Path:
-    """An input file in a folder."""
+    """Write an input file to a folder."""
     path = Path(folder) / name
     path.write_text(text)
     return path
 
 
 def executable(path, text, shell="sh") -> Path:
-    """A script that stands in for a program."""
+    """Write a script that stands in for a program."""
     path.parent.mkdir(exist_ok=True)
     path.write_text(f"#!/usr/bin/env {shell}\n{text}\n")
     path.chmod(0o755)
@@ -112,18 +116,18 @@ def executable(path, text, shell="sh") -> Path:
 
 
 def environment(**more) -> dict[str, str]:
-    """The environment of the tests and more variables, without those of a `make` around it."""
+    """Return the environment of the tests with more variables, without those of `make`."""
     own = {name: value for name, value in os.environ.items() if "MAKE" not in name}
     return own | {name: str(value) for name, value in more.items()}
 
 
 def ran(*command, check=False, **options) -> subprocess.CompletedProcess:
-    """A command that has ended, with what it has said."""
+    """Run a command, and return it with its output."""
     options = {"capture_output": True, "text": True, "timeout": PATIENCE, **options}
     return subprocess.run(list(map(str, command)), check=check, **options)
 
 
-#: A library that the program is started with instead of the system's own fsync.
+#: Library preloaded to replace the fsync of the system.
 FSYNC = """#include <errno.h>
 #include <signal.h>
 #include <unistd.h>
@@ -132,7 +136,7 @@ int fsync(int d) { (void)d; %s }
 
 
 def with_fsync(folder, body) -> dict[str, str]:
-    """The environment of a program for which fsync does something else."""
+    """Return the environment of a program for which fsync has the given body."""
     (folder / "fsync.c").write_text(FSYNC % body)
     command = ["cc", "-shared", "-fPIC", "-o", "fsync.so", "fsync.c"]
     subprocess.run(command, cwd=folder, check=True)
@@ -140,7 +144,7 @@ def with_fsync(folder, body) -> dict[str, str]:
 
 
 def occupy(path, kind, precious):
-    """Puts something in a place; links lead to a file of the user."""
+    """Put something in a place; links lead to a file of the user."""
     if kind == "link":
         path.symlink_to(precious)
     elif kind == "hard link":
@@ -157,13 +161,13 @@ def occupy(path, kind, precious):
         path.write_text("notes")
 
 
-#: When a wait is given up [s]. It ends what hangs, and is no measure of anything: what takes a busy
-#: machine minutes passes, too.
+#: Time after which a wait is abandoned [s]. It ends hanging processes and measures nothing:
+#: whatever takes a busy machine several minutes passes, too.
 PATIENCE = 900
 
 
 def wait_for(condition):
-    """Returns when the condition holds. The longer the wait, the less often one looks."""
+    """Wait until a condition holds, checking it less often the longer it takes."""
     begin = time.monotonic()
     while not condition():
         waited = time.monotonic() - begin
@@ -175,17 +179,17 @@ def wait_for(condition):
 
 
 def facts_of(pid) -> list[str]:
-    """Data of the system about a process, from its state on (proc(5), /proc/PID/stat, field 3)."""
+    """Return data of the system about a process, from its state on (proc(5), field 3 of stat)."""
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
 
 
 def processor_time(pid) -> float:
-    """Processor time of a process so far, with the children that it has waited for [s]."""
+    """Return the processor time of a process so far, including children it has waited for [s]."""
     return sum(map(int, facts_of(pid)[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def within(seconds) -> list[str]:
-    """The beginning of a command that is killed when it has used so much processor time, if any."""
+    """Return the beginning of a command that is killed after a processor time, if any is given."""
     return ["prlimit", f"--cpu={seconds}"] if seconds else []
 
 
@@ -196,24 +200,24 @@ def with_parent(*command) -> list:
 
 
 def is_asleep(pid) -> bool:
-    """Whether a process waits for something; not for a disk, nor for a processor."""
+    """Return whether a process waits for something other than a disk or a processor."""
     return facts_of(pid)[0] == "S"
 
 
 def heeds(pid, number) -> bool:
-    """Whether a process has a handler for a signal."""
+    """Return whether a process has a handler for a signal."""
     caught = re.search(r"^SigCgt:\s+(\w+)", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)
     return bool(int(caught[1], 16) >> (number - 1) & 1)
 
 
 def has_ended(process) -> bool:
-    """Whether a process has ended; the system still knows it until somebody waits for it."""
+    """Return whether a process has ended, even if nobody has waited for it yet."""
     how = os.WEXITED | os.WNOHANG | os.WNOWAIT
     return process.returncode is not None or os.waitid(os.P_PID, process.pid, how) is not None
 
 
 def let_work(process, seconds=0.0):
-    """Returns when a run can be stopped and has used so much processor time, or has ended."""
+    """Wait until a run can be stopped and has used a processor time, or has ended."""
     wait_for(
         lambda: (
             has_ended(process)
@@ -224,7 +228,7 @@ def let_work(process, seconds=0.0):
 
 @contextlib.contextmanager
 def held(process):
-    """A process stands still meanwhile, so that it is where it was found."""
+    """Keep a process stopped, so that its state does not change meanwhile."""
     process.send_signal(signal.SIGSTOP)
     yield
     process.send_signal(signal.SIGCONT)
@@ -232,7 +236,7 @@ def held(process):
 
 @contextlib.contextmanager
 def filled_pipe():
-    """A pipe that takes nothing any more: whoever reads it has stopped reading."""
+    """Yield a pipe that accepts no more data, because its reader has stopped reading."""
     outlet, inlet = os.pipe()
     os.set_blocking(inlet, False)
     with contextlib.suppress(BlockingIOError):
@@ -245,20 +249,21 @@ def filled_pipe():
 
 
 def ended_soon(process, number, seconds=1.0, members=()) -> str:
-    """Sends a signal; what the process says until its end, which takes less than so long.
+    """Send a signal to a process, and return its output up to its end, which must come soon.
 
-    By processor time, with what the `members` use that the process waits for: by the clock it is
-    as long as other programs make it.
+    The limit is on processor time, including that of the `members` for which the process waits,
+    because wall time depends on other programs.
     """
     before = sum(map(processor_time, [process.pid, *members]))
-    os.kill(process.pid, number)  # Popen's own way takes notice of an end, and the facts are gone
+    # Popen's own method would notice the end of the process and discard its data
+    os.kill(process.pid, number)
     wait_for(lambda: has_ended(process))
     assert processor_time(process.pid) - before < seconds
     return process.communicate()[1]
 
 
 def frames_in(path, group="particles/disks") -> int:
-    """Committed frames, or samples of another group; 0 if there is no file yet."""
+    """Return the number of committed frames, or samples of another group; 0 without a file."""
     try:
         with h5py.File(path, "r", locking=False) as file:
             return int(file[group]["committed"][()])

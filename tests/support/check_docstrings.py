@@ -2,8 +2,8 @@
 
     python tests/support/check_docstrings.py
 
-The script prints one line for each problem.  It checks the names in `__all__` of the package and of
-the modules in `MODULES`.
+The names in `__all__` of the package and of the modules in `MODULES` are checked; each problem is
+printed on one line.
 """
 
 import sys
@@ -30,7 +30,7 @@ MODULES = (
     "fields",
     "streams",
 )
-#: Rules of numpydoc that do not apply to this project, with reasons.
+#: Rules of numpydoc that are not applied in this project, with reasons.
 IGNORED = {
     "GL01": "the summary stands on the line of the quotes, as everywhere in the project",
     "ES01": "a summary that says all needs no more text",
@@ -46,13 +46,13 @@ IGNORED = {
 #: Classes whose public methods and properties are also checked.
 CLASSES = ("Run", "Simulation")
 METHODS = (FunctionType, classmethod, staticmethod)
-#: Rules that do not apply to named tuples, which need no examples because functions return them.
+#: Rules that are not applied to named tuples, which need no examples because functions return them.
 OF_CLASSES = {"EX01", "PR01", "PR02"}
 
 
 def problems() -> list[str]:
     """Return all problems as `module.name: CODE text`."""
-    from numpydoc.validate import validate  # not installed in all tests
+    from numpydoc.validate import validate  # missing where only some tests are run
 
     found = []
     for module in ("ricochet", *(f"ricochet.{name}" for name in MODULES)):

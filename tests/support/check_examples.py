@@ -2,9 +2,9 @@
 
     python tests/support/check_examples.py FOLDER
 
-The script writes one file for each section of README.md, and of the pages in docs/, that contains
-an example.  A section without imports is added to the file of the previous section.  The code cells
-of the notebook docs/tutorials/tour.ipynb form another file.
+One file is written for each section of README.md and of the pages in docs/ that contains an
+example, and one for the code cells of the notebook docs/tutorials/tour.ipynb. A section without
+imports is appended to the file of the previous section.
 """
 
 import ast
@@ -20,7 +20,7 @@ TOUR = ROOT / "docs" / "tutorials" / "tour.ipynb"
 
 
 def blocks_of(section: str) -> list[str]:
-    """Return the Python code in a section: indented blocks with imports or calls, and fences."""
+    """Return the Python code in a section: fences, and indented blocks with imports or calls."""
     fences = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
     marked = [code for language, code in fences.findall(section) if language == "python"]
     blocks = re.findall(r"(?:^    .*\n(?:\n(?=    ))?)+", fences.sub("", section), re.MULTILINE)
@@ -28,7 +28,7 @@ def blocks_of(section: str) -> list[str]:
 
 
 def is_python(block: str) -> bool:
-    """Return whether a block of code is Python code, and not a shell command or Fortran code."""
+    """Return whether a block of code is Python, rather than shell commands or Fortran."""
     try:
         nodes = [*ast.walk(ast.parse(block))]
     except SyntaxError:

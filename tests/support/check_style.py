@@ -71,7 +71,7 @@ DENIED = {
 
 
 class Problem(NamedTuple):
-    """A violation of a rule, with the file and line where it occurs."""
+    """Violation of a rule, with file and line."""
 
     path: Path
     line: int
@@ -82,7 +82,7 @@ class Problem(NamedTuple):
 
 
 def code_of(line: str) -> str:
-    """Return a line of code in lower case, without strings and without its comment."""
+    """Return a line of code in lower case, without strings and comment."""
     return bare(line).lower()
 
 
@@ -100,7 +100,7 @@ def keyword_problems(path: Path, text: str) -> Iterator[Problem]:
 
 
 def arrows_of(page: str) -> dict[str, set[str]]:
-    """Return the folders that each folder may use, from lines like `one --> other & another`."""
+    """Return the folders that each folder may use, from lines such as `one --> other & another`."""
     arrows: dict[str, set[str]] = {}
     for start, ends in ARROWS.findall(page):
         arrows.setdefault(start, set()).update(re.findall(r"\w+", ends))
@@ -110,7 +110,7 @@ def arrows_of(page: str) -> dict[str, set[str]]:
 def arrow_problems(
     path: Path, lines: list[str], homes: dict[str, str], arrows: dict[str, set[str]]
 ) -> Iterator[Problem]:
-    """Return `use` statements that have no `only`, or that contradict the arrows."""
+    """Yield `use` statements that lack `only` or contradict the arrows."""
     own = path.parent.name
     for number, line in enumerate(lines, start=1):
         use = USE.match(line)
@@ -125,7 +125,7 @@ def arrow_problems(
 
 
 def import_problems(root: Path, package: Path) -> Iterator[Problem]:
-    """Return imports in a Python package that contradict the arrows between its folders.
+    """Yield imports in a Python package that contradict the arrows between its folders.
 
     A module at the top level of the package counts as a folder; `__init__.py` may use all folders.
     """
@@ -146,7 +146,7 @@ def import_problems(root: Path, package: Path) -> Iterator[Problem]:
 
 
 def imports_of(path: Path, package: Path) -> Iterator[tuple[int, str]]:
-    """Return for each import in a file its line and the imported folder of the package."""
+    """Yield the line of each import in a file, and the folder of the package that it imports."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.level > 0:
             start = path.parents[node.level - 1].relative_to(package).parts
@@ -162,7 +162,7 @@ def imports_of(path: Path, package: Path) -> Iterator[tuple[int, str]]:
 
 
 def length_problems(root: Path) -> Iterator[Problem]:
-    """Return the files of code outside `src/` that are too long."""
+    """Yield code files outside `src/` that are too long."""
     paths = [path for name in ("post", "runs", "tests") for path in (root / name).rglob("*.*")]
     for path in sorted(path for path in paths if path.suffix in CODE):
         if (count := len(path.read_text().splitlines())) > MOST_LINES_OF_FILE:
@@ -171,7 +171,7 @@ def length_problems(root: Path) -> Iterator[Problem]:
 
 
 def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
-    """Return a problem if a file is too long or is not one private module with the file's name."""
+    """Yield a problem if a file is too long, or not one private module named like the file."""
     if len(lines) > MOST_LINES_OF_FILE:
         yield Problem(path, len(lines), f"more than {MOST_LINES_OF_FILE} lines")
     units = [unit for line in lines if (unit := UNIT.match(line))]
@@ -187,7 +187,7 @@ def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
 
 
 def procedure_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
-    """Return procedures that are too long, or whose names contain a meaningless word."""
+    """Yield procedures that are too long, or whose names contain a meaningless word."""
     start = name = None
     for number, line in enumerate(lines, start=1):
         if END.match(line):
@@ -201,7 +201,7 @@ def procedure_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
 
 
 def column_problems(path: Path, text: str) -> Iterator[Problem]:
-    """Return comment lines, and lines of code with a comment, that are too long."""
+    """Yield comment lines, and lines of code with a comment, that are too long."""
     for number, line in enumerate(text.splitlines(), start=1):
         if re.match(r"\s*!(?!\$)", line):
             most = MOST_COLUMNS_OF_COMMENT
@@ -214,9 +214,9 @@ def column_problems(path: Path, text: str) -> Iterator[Problem]:
 
 
 def statements_of(text: str) -> list[tuple[int, str]]:
-    """Return statements, comments and empty lines with line numbers.
+    """Return statements, comments and empty lines with their line numbers.
 
-    Continuation lines are joined to one line.
+    Continuation lines are joined.
     """
     statements: list[tuple[int, str]] = []
     continued = False
@@ -231,10 +231,10 @@ def statements_of(text: str) -> list[tuple[int, str]]:
 
 
 def heading_problems(path: Path, text: str) -> Iterator[Problem]:
-    """Return procedures that lack a comment or an empty line, or have too many arguments.
+    """Yield procedures that lack a comment or an empty line, or have too many arguments.
 
-    Interfaces of C functions need no comment, because manual pages describe these functions. Nor
-    does a private procedure of less than ten lines whose name says everything.
+    No comment is needed for interfaces of C functions, which manual pages describe, and for private
+    procedures of fewer than ten lines.
     """
     statements = statements_of(text)
     offered = public_names(statements)
@@ -274,7 +274,7 @@ def public_names(statements: list[tuple[int, str]]) -> set[str]:
 
 
 def name_problems(root: Path, paths: list[Path]) -> Iterator[Problem]:
-    """Return imported and public names that are not used; public types are not checked."""
+    """Yield imported and public names that are unused; public types are not checked."""
     tests = [*(root / "tests").rglob("*.pf"), *(root / "tests").rglob("*.f90")]
     uses = re.compile(r"use(?:, *intrinsic *::)? *(\w+) *, *only *: *(.*)")
     wanted = set()
@@ -297,7 +297,7 @@ def name_problems(root: Path, paths: list[Path]) -> Iterator[Problem]:
 
 
 def path_problems(root: Path) -> Iterator[Problem]:
-    """Return paths that exist only on one computer, in files that are or could be committed."""
+    """Yield paths that exist only on one computer, in files that are or could be committed."""
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
     for name in subprocess.check_output(command, cwd=root, text=True).splitlines():
         try:
@@ -310,7 +310,7 @@ def path_problems(root: Path) -> Iterator[Problem]:
 
 
 def comments_of(path: Path) -> Iterator[tuple[int, str]]:
-    """Return the line number and the text of each docstring and each block of comment lines."""
+    """Yield the line number and the text of each docstring and each block of comment lines."""
     text = path.read_text()
     if path.suffix == ".py":
         for node in ast.walk(ast.parse(text)):
@@ -344,7 +344,7 @@ def comments_of(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def language_problems(root: Path) -> Iterator[Problem]:
-    """Return help texts that do not begin with a noun, badly begun sentences, and denied words."""
+    """Yield help texts without an initial noun, badly begun sentences, and denied expressions."""
     for path in sorted((root / "src").glob("*/*.f90")):
         text = path.read_text()
         for row in HELP.finditer(text):
@@ -370,14 +370,14 @@ def language_problems(root: Path) -> Iterator[Problem]:
 
 
 def denied_words(path: Path, line: int, words: str) -> Iterator[Problem]:
-    """Return a problem for each denied word in a text."""
+    """Yield a problem for each denied expression in a text."""
     for pattern, better in DENIED.items():
         if found := re.search(pattern, words):
             yield Problem(path, line, f"{found[0]!r}: write {better}")
 
 
 def problems_of(root: Path) -> Iterator[Problem]:
-    """Return all problems of the project in the folder `root`."""
+    """Yield all problems of the project in the folder `root`."""
     arrows = arrows_of((root / "src" / "README.md").read_text())
     paths = sorted((root / "src").rglob("*.f90"))
     homes = {path.stem: path.parent.name for path in paths}
@@ -409,7 +409,7 @@ def problems_of(root: Path) -> Iterator[Problem]:
 
 
 def main() -> int:
-    """Print all problems, and return the exit status: 1 if there are problems, otherwise 0."""
+    """Print all problems; return the exit status, 1 if there are any."""
     problems = list(problems_of(Path(sys.argv[1] if len(sys.argv) > 1 else ".")))
     print(*problems, sep="\n", end="\n" if problems else "")
     return 1 if problems else 0

@@ -2,15 +2,16 @@
 
     python tests/support/compare_bits.py OLD NEW [MORE.nml...]
 
-OLD and NEW are two builds of the program, for example of two commits.  The script compares the
-results for all input files and for random systems.  The group `provenance` of the output files is
-not compared.  The option --except names the paths of datasets whose layout was changed on purpose.
-With --sums 1e-13, sums over collisions may differ by this fraction of their largest value or of the
-energy.  With --old-names, OLD is a program with the former public names (tables OLD_WORDS and
-OLD_PATHS).  Its input files are written with the former names, and its datasets are compared with
-those of the present names.  The script prints one line for each run.  If OLD refuses an input
-because of an unknown variable, the line says "unknown to OLD".  The exit status is 1 if any runs
-differ.
+OLD and NEW are builds of the program, for example of two commits. Results are compared for all
+input files and for random systems, except the group `provenance` of the output files. One line is
+printed for each run; it ends in "unknown to OLD" if OLD refuses the input because of an unknown
+variable. The exit status is 1 if any runs differ.
+
+--except      paths of datasets whose layout was changed on purpose
+--sums 1e-13  sums over collisions may differ by this fraction of their largest value or of the
+energy
+--old-names   OLD has the former public names (tables OLD_WORDS and OLD_PATHS), with which its input
+files are written and which are converted in its output
 """
 
 import argparse
@@ -31,7 +32,7 @@ from whole_runs import contents, ran, unlike, write_input  # noqa: E402
 
 SYSTEMS = 60
 
-# Former names in input files: for each group, patterns of present names and the former names.
+# Former names in input files: for each group, patterns of present names, and the former names.
 OLD_WORDS = {
     "side": {
         r"\bstart_time(?= *=)": "begin",
@@ -90,7 +91,7 @@ def for_old(text: str) -> str:
 
 
 def of_old(found: dict) -> dict:
-    """Return the datasets of an earlier program under the present names."""
+    """Return the datasets of an earlier program under their present names."""
     renamed = dict(found)
     for pattern, words in OLD_VALUES.items():
         for path in filter(re.compile(pattern).fullmatch, found):
@@ -101,7 +102,7 @@ def of_old(found: dict) -> dict:
 
 
 def random_inputs(folder: Path) -> list[Path]:
-    """Write random input files and their starting files, each into a separate folder."""
+    """Write random inputs and their initial-configuration files, each into a folder of its own."""
     inputs = []
     for k in range(SYSTEMS):
         system, place = random_system(random.Random(k)), folder / f"random_{k}"
@@ -119,7 +120,7 @@ SUMS = re.compile(
 
 
 def is_near(name: str, old: dict, new: dict, share: float) -> bool:
-    """Return whether two sums are equal within a fraction of their largest value or the energy."""
+    """Return whether two sums agree within a fraction of their largest value or of the energy."""
     if not (SUMS.fullmatch(name) and name in old and name in new):
         return False
     a, b = old[name], new[name]
@@ -132,7 +133,7 @@ def compare(
 ) -> list[str] | None:
     """Return the differences between the results of two programs: exit codes, or dataset names.
 
-    The result is None if the input contains a variable that the old program does not have.
+    The result is None if the input contains a variable that is unknown to the old program.
     """
     ends, files, text = [], [], path.read_text()
     text_of_old = for_old(text) if old_names else text

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-#: A row of a table: module, unit tests, tests of whole runs.
+#: Row of a table: module, unit tests, tests of whole runs.
 ROW = re.compile(r"^\| `(\w+)` \|([^|\n]*)\|([^|\n]*)\|$", re.MULTILINE)
 USE = re.compile(r"^ *use +(\w+)|^submodule *\((\w+)\)", re.MULTILINE)
 
@@ -20,7 +20,7 @@ def protecting_tests(root: Path) -> dict[str, list[str]]:
 
 
 def reached(module: str, uses: dict[str, set[str]]) -> set[str]:
-    """Return all modules that a module uses, directly or through others, and itself."""
+    """Return a module and all modules that it uses, directly or indirectly."""
     found: set[str] = set()
     new = {module}
     while new:
@@ -30,9 +30,9 @@ def reached(module: str, uses: dict[str, set[str]]) -> set[str]:
 
 
 def protection_problems(root: Path) -> Iterator[str]:
-    """Return sources without tests, and rows whose source or tests do not exist or do not fit.
+    """Yield sources without tests, and rows whose source or tests do not exist or do not fit.
 
-    A unit test fits if it has the name of the module, or uses it, directly or through others.
+    A unit test fits if it is named like the module, or uses it directly or indirectly.
     """
     known = protecting_tests(root)
     tests = {path.name: path for path in (root / "tests").rglob("test_*.p[fy]")}

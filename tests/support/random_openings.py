@@ -1,7 +1,7 @@
 """Open sides, sources, waiting disks and scheduled changes for random systems.
 
-They are drawn with random numbers of their own, so that all other choices of a system are the same
-with and without them.
+They use random numbers of their own, so that all other choices of a system are the same with and
+without them.
 """
 
 import math
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 SIDES = ("left", "right", "bottom", "top")
 MOST_ACTIONS = 200  #: of a source
-#: Species to which waiting disks can be added: their number of disks is given.
+#: Species to which waiting disks can be added, because their number of disks is given.
 COUNTED = re.compile(r"(?<= count = )\d+")
 
 
@@ -24,10 +24,10 @@ def numbers(*values: float) -> str:
 
 
 class Openings:
-    """Changes of the groups of a random system, so that disks leave and enter the box."""
+    """Changes in the groups of a random system that let disks leave and enter the box."""
 
     def __init__(self, draw: "Draw", parts: list[str]):
-        """Store the groups of the system, which the methods change."""
+        """Store the groups of the system, which the methods modify."""
         self.draw, self.parts = draw, parts
         self.rng = random.Random(repr(draw.rng.getstate()[1][:9]))
         self.lids: list[str] = []
@@ -39,16 +39,16 @@ class Openings:
         return self.rng.random() < share
 
     def place_of(self, group: str) -> int:
-        """Return the index of the first group with the given name."""
+        """Return the index of the first group with a given name."""
         return next(k for k, part in enumerate(self.parts) if part.startswith(f"&{group} "))
 
     def add(self, group: str, words: str) -> None:
-        """Add variables to the first group with the given name."""
+        """Add variables to the first group with a given name."""
         k = self.place_of(group)
         self.parts[k] = f"{self.parts[k].removesuffix(' /')} {words} /"
 
     def all_parts(self) -> list[str]:
-        """Return the groups of the system: a share is open, and a share has scheduled changes."""
+        """Return the groups of the system, open and with scheduled changes in some of the cases."""
         open_system = self.chance(0.25) and not self.draw.sheared
         changed = self.chance(0.5 if open_system else 0.1)
         self.end = self.flight
@@ -65,7 +65,7 @@ class Openings:
         return self.parts
 
     def limit_time(self) -> None:
-        """Add a limit of time, because a source whose region is full tries for ever."""
+        """Add a time limit, because a source whose region is full never stops trying."""
         stop = self.parts[self.place_of("stop")]
         self.end = self.flight * 10.0 ** self.rng.uniform(-0.5, 1)
         if given := re.search(r" time = (\S+)", stop):
@@ -74,13 +74,13 @@ class Openings:
             self.add("stop", f"time = {self.end!r}")
 
     def close_options(self) -> None:
-        """Remove what cannot be combined with an open system."""
+        """Remove settings that cannot be combined with an open system."""
         for group, word in (("stop", r" energy_fraction = \S+"), ("output", r" helfand = \S+")):
             k = self.place_of(group)
             self.parts[k] = re.sub(word, "", self.parts[k])
 
     def open_sides(self) -> None:
-        """Open sides without a motion, or give them a lid that is closed at the start."""
+        """Open sides without a motion, or give them a lid that is initially closed."""
         for k, name in enumerate(SIDES):
             if self.draw.periodic[k // 2] or self.chance(0.5):
                 continue
@@ -111,7 +111,7 @@ class Openings:
             self.parts[k] = f"{words} waiting = {more} /"
 
     def region(self) -> str:
-        """Return a region in which disks enter: the whole box, or a part of it."""
+        """Return a region in which disks enter: the whole box or a part of it."""
         if self.chance(0.3):
             return ""
         ends = []
@@ -149,7 +149,7 @@ class Openings:
             self.parts.append(f"&source{name}{self.region()} interval = {interval!r} {words} /")
 
     def schedule(self) -> None:
-        """Add changes, some of which occur at the time of an action of a source or of a kick."""
+        """Schedule changes, some of them at the time of an action of a source or of a kick."""
         for k in range(self.rng.choice([1, 1, 2, 4])):
             time = self.rng.uniform(0, 1.2) * self.end
             if self.ties and self.chance(0.4):

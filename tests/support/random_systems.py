@@ -1,9 +1,9 @@
 """Random systems that use all groups of the input, to find failures in cases without a test.
 
-Scale, shape, boundaries, disks, obstacles, contact laws, sampling and stop rules are chosen
-independently at random.  Difficult cases are preferred: a restitution of exactly 0, parallel
-velocities, lattices, clusters, narrow boxes, and large ratios of size and mass.  A system consists
-of an input text and a starting file.
+Scale, shape, boundaries, disks, obstacles, contact laws, sampling and stop conditions are drawn
+independently. Difficult cases are preferred: a restitution of exactly 0, parallel velocities,
+lattices, clusters, narrow boxes, and large ratios of size and mass. A system consists of an input
+text and an initial-configuration file.
 """
 
 import math
@@ -18,22 +18,22 @@ from random_openings import Openings
 MOST_EVENTS, MOST_OF_FEW = 40_000, 12_000  #: one or two epochs for many disks
 SIDES = ("left", "right", "bottom", "top")
 CADENCES = ("time", "collisions", "events", "collisions_per_disk")
-#: Input variables whose value is a word; each word counts as a feature of the system.
+#: Input variables whose value is a keyword; each keyword counts as a feature of the system.
 KINDS = r"(dynamics|motion|rule|law|placement|velocities|kind|side|precision) = '(\w+)'"
 
 
 class System(NamedTuple):
-    """A random system: its input text, the text of its starting file, and a description."""
+    """Random system: input text, text of its initial-configuration file, and a description."""
 
     text: str
     columns: list[str]
     table: np.ndarray
     disks: int
     events: int
-    draw: "Draw"  #: used to draw changes that are valid for the system
+    draw: "Draw"  #: draws changes that are valid for the system
 
     def features(self) -> set[str]:
-        """Return the features of the system: variables, kinds, and boundary conditions."""
+        """Return the features of the system: variables, keywords, and boundary conditions."""
         found = {"many disks"} if self.disks > 2500 else set()
         for group, words in re.findall(r"^&(\w+)(.*)/$", self.text, re.MULTILINE):
             found |= {f"{group}.{name}" for name in re.findall(r"(\w+) =", words)}
@@ -45,7 +45,7 @@ class System(NamedTuple):
 
 
 def starting_file(columns: list[str], table: np.ndarray) -> str:
-    """Return a table of disks as the text of a starting file."""
+    """Return a table of disks as the text of an initial-configuration file."""
     return "\n".join([" ".join(columns), *(numbers(*row) for row in table.tolist())]) + "\n"
 
 
@@ -55,7 +55,7 @@ def numbers(*values: float) -> str:
 
 
 class Draw:
-    """Random choice of one system, in which earlier choices restrict later choices."""
+    """Random choice of one system, in which earlier choices restrict later ones."""
 
     def __init__(self, rng: random.Random, most: int):
         """Draw the scales of length, time and mass, on which other quantities depend."""
@@ -72,7 +72,8 @@ class Draw:
         self.periodic = [self.chance(0.4), self.chance(0.4)]
         self.steps = self.chance(0.1)
         self.packing = rng.choice([0.01, 0.1, 0.2, 0.3, 0.4, 0.5])
-        self.least = 0.6 if self.chance(0.2) else 0  # restitution; of the viscoelastic law
+        # smallest restitution, for the viscoelastic law
+        self.least = 0.6 if self.chance(0.2) else 0
         self.turns = self.chance(0.3)
         self.rotates = False
         self.recycles = False
@@ -80,10 +81,10 @@ class Draw:
         self.driven = self.chance(0.3)
         self.falls = self.chance(0.3) and not all(self.periodic)
         self.sheared = all(self.periodic) and not self.steps and self.chance(0.5)
-        self.loses = False  # energy is lost in each collision
-        self.bouncing = False  # the run may be endless because of the contact time
-        self.worked = False  # energy changes at walls: no stop rule on it
-        self.drifts = all(self.periodic)  # the centre of mass moves for ever if nothing is random
+        self.loses = False  # each collision dissipates energy
+        self.bouncing = False  # the contact time may make the run endless
+        self.worked = False  # walls change the energy, so that no stop condition may depend on it
+        self.drifts = all(self.periodic)  # without randomness, the centre of mass moves for ever
         self.columns: list[str] = []
         self.table = np.empty((0, 8))
         self.kinds = 1
@@ -130,7 +131,7 @@ class Draw:
     # --- collision rules and motions of boundaries ---
 
     def law(self) -> str:
-        """Draw the collision rule of one boundary, which is often the default rule."""
+        """Draw the collision rule of one boundary, often the default."""
         rng = self.rng
         if self.chance(0.5):
             return ""
@@ -146,7 +147,7 @@ class Draw:
         return f"{words} rule = 'normal'{self.grip(least=-0.9)}{sliding}"
 
     def grip(self, wall: str = "", least: float = -1) -> str:
-        """Draw tangential restitution and friction of disks or of walls."""
+        """Draw tangential restitution and friction of disks or walls."""
         beta = self.rng.choice([least, 0, 1, self.rng.uniform(least, 1)])
         words = f" {wall}tangential_restitution = {beta}"
         if beta > -1:
@@ -173,7 +174,7 @@ class Draw:
         return groups
 
     def side_motion(self) -> str:
-        """Draw the motion of one side of the box."""
+        """Draw the motion of one side."""
         rng = self.rng
         self.worked = True
         kinds = ["constant_velocity", "parabolic", "sawtooth", "sine"]
@@ -214,7 +215,7 @@ class Draw:
                     two[axis] = one[axis]
                 name = self.maybe(0.3, f"name = 'w{k}'")
                 ends = f" from = {numbers(*one)} to = {numbers(*two)}"
-                if self.chance(0.3):  # a triangle, or a polyline whose ends are apart
+                if self.chance(0.3):  # a triangle, or an open polyline
                     last = rng.choice([one, self.place(rng.random(), rng.random())])
                     middle = self.place(rng.random(), rng.random())
                     ends = f" points = {numbers(*one, *two, *middle, *last)}"
@@ -231,7 +232,7 @@ class Draw:
         return groups
 
     def arc(self, small: float) -> str:
-        """Draw an arc that lies inside the box, whose shorter edge has the given length."""
+        """Draw an arc inside a box whose shorter edge has the given length."""
         rng = self.rng
         where = f"centre = {numbers(*self.place(rng.uniform(0.3, 0.7), rng.uniform(0.3, 0.7)))}"
         radius = rng.uniform(0.01, 0.3) * small
@@ -281,7 +282,7 @@ class Draw:
         return words
 
     def species(self, blocked: bool) -> list[str]:
-        """Draw up to three randomly placed species, or one species in a starting file."""
+        """Draw up to three randomly placed species, or one species read from a file."""
         rng, groups, self.blocked = self.rng, [], blocked
         if not blocked and self.chance(0.2):
             return [rng.choice([self.from_file, self.from_file, self.by_position])()]
@@ -322,7 +323,7 @@ class Draw:
         return groups
 
     def of_many_sizes(self) -> list[str]:
-        """Draw species with about equal total areas, in descending order of radius."""
+        """Draw species of about equal total area, in decreasing order of radius."""
         kinds, ratio = self.rng.randint(3, 6), 10.0 ** self.rng.uniform(0.3, 2)
         wide, high = self.region()
         radii = [ratio ** (-k / (kinds - 1)) for k in range(kinds)]
@@ -339,7 +340,7 @@ class Draw:
         ]
 
     def relaxed(self) -> list[str]:
-        """Draw up to three species that fill the whole box and are equilibrated by event chains."""
+        """Draw up to three species that fill the box and are equilibrated by event chains."""
         rng, self.where = self.rng, ""
         self.kinds = rng.choice([1, 1, 2, 3])
         sweeps = rng.choice([0, 1, 5])
@@ -367,7 +368,7 @@ class Draw:
         return self.rng.choice(["random", "random", "lattice", "grid", *few])
 
     def by_position(self) -> str:
-        """Draw a few disks in a row, some of which are almost in contact."""
+        """Draw a few disks in a row, some of them almost in contact."""
         self.disks = count = self.rng.randint(3, 8)
         x = [self.place((k + 0.5) / count, self.rng.choice([0.5, 0.52])) for k in range(count)]
         radius = 0.5 * min(self.edges[0] / count, 0.9 * self.edges[1])
@@ -377,7 +378,7 @@ class Draw:
         return f"&species name = 's0' {words} /"
 
     def from_file(self) -> str:
-        """Draw a starting file: a square lattice of disks with different sizes and velocities."""
+        """Draw a file with a square lattice of disks of different sizes and velocities."""
         rng = self.rng
         columns = max(round(math.sqrt(self.disks * self.edges[0] / self.edges[1])), 1)
         rows = max(self.disks // columns, 1)
@@ -416,9 +417,9 @@ class Draw:
         on_walls = max(self.least, rng.choice([0, 1, 0.9, rng.random()]))
         words += self.maybe(0.5, f"wall_restitution = {on_walls}")
         if min(restitution, on_walls) < 1 and (any(self.periodic) or on_walls == 0):
-            self.drifts = True  # or all disks come to rest
+            self.drifts = True  # otherwise all disks come to rest
         if self.least or self.chance(0.2):
-            self.drifts = True  # events become rarer, so that the last one may require a long time
+            self.drifts = True  # events become rare, and the last one may take a long time
             law = "viscoelastic" if self.least else rng.choice(["power", "elastic_below"])
             words += f" restitution_law = '{law}'"
             words += f" reference_speed = {self.speed * 10.0 ** rng.uniform(-2, 1)!r}"
@@ -436,7 +437,7 @@ class Draw:
         return words + " /"
 
     def drive(self) -> str:
-        """Draw the driving; its interval may be much shorter or much longer than a free flight."""
+        """Draw the driving, whose interval may be much shorter or longer than a free flight."""
         if not self.driven:
             return ""
         rng = self.rng
@@ -464,7 +465,7 @@ class Draw:
         return f"&drive interval = {interval!r} {words} /"
 
     def recycling(self, energy: float) -> str:
-        """Draw the regions between which disks are recycled, and the velocity of recycled disks."""
+        """Draw the regions between which disks are recycled, and their new velocities."""
         rng = self.rng
         axis, first, second = rng.choice([0, 1]), rng.uniform(0.05, 0.5), rng.uniform(0.5, 0.9)
         regions = [[0.0, 1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]]
@@ -499,7 +500,7 @@ class Draw:
                 words += self.maybe(0.9, " at_rest = .true.")
         if self.chance(0.3) or self.steps or self.driven or self.drifts or self.disks < 4:
             words += f" time = {rng.uniform(0.01, 1) * min(self.edges) / self.speed!r}"
-        else:  # if events become rare, the samples until the last event would fill the disk
+        else:  # if events become rare, samples up to the last event would fill the disk
             far = 100 if max(self.edges) > 30 * min(self.edges) else 1000
             words += f" time = {far * min(self.edges) / self.speed!r}"
         return words + " /"
@@ -527,7 +528,7 @@ class Draw:
         return words + " /"
 
     def own_columns(self) -> str:
-        """Return the columns of frames that exist in some systems only, among them in this one."""
+        """Return those columns of frames that only systems such as this one have."""
         image = ", 'image'" if any(self.periodic) else ""
         recycled = ", 'recycled'" if self.recycles else ""
         return image + (", 'orientation'" if self.rotates else "") + recycled
@@ -545,7 +546,7 @@ class Draw:
 def random_system(rng: random.Random, most: int = 10**6, openings: bool = True) -> System:
     """Return a random system of at most about `most` disks, which the program may refuse.
 
-    Without `openings` the system has no open sides, sources, waiting disks and scheduled changes.
+    Without `openings` the system has no open sides, sources, waiting disks or scheduled changes.
     """
     draw = Draw(rng, most)
     walls = draw.sides()
@@ -553,7 +554,7 @@ def random_system(rng: random.Random, most: int = 10**6, openings: bool = True) 
     disks = draw.species(bool(obstacles))
     parts = [draw.run(), draw.box(), *walls, *obstacles, *disks, draw.contact(), draw.drive()]
     alone = draw.disks == 1 or ("species = 's0'" in parts[-1] and " count = 1 " in disks[0])
-    if alone:  # the momentum of a single driven disk is its velocity: only a free one is driven
+    if alone:  # the momentum of a single driven disk is its velocity, so only a free one is driven
         parts[-1] = parts[-1].replace("keep_momentum = .true.", "keep_momentum = .false.")
     parts += [draw.stop(), draw.output()]
     draw.openings = Openings(draw, [part for part in parts if part])

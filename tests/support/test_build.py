@@ -17,8 +17,8 @@ import pytest
 from whole_runs import environment, executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Files that the documentation mentions but that are not installed; they exist only in the source
-#: tree.
+#: Files that the documentation mentions but that exist only in the source tree, because they are
+#: not installed.
 SOURCES = {"src", "post", "runs", "tests", "CONTRIBUTING.md", "Containerfile"}
 PFUNIT_DIR = os.environ.get("PFUNIT_DIR", "")
 SUITE = """module test_it
@@ -49,7 +49,7 @@ def small(tmp_path) -> list[str]:
 
 @pytest.mark.skipif(not shutil.which("objdump"), reason="objdump is not installed")
 def test_a_prefetch_of_the_event_loop_is_an_instruction(program):
-    """As a call of a function, a prefetch makes simulations of 1e5 disks slower by 30 %."""
+    """If a prefetch is a function call, simulations of 1e5 disks are slower by 30 %."""
     event_loop = program.parent / "event_loop.o"
     if not event_loop.exists():
         pytest.skip("this compiler cannot make one object of the event loop")
@@ -64,7 +64,7 @@ def test_two_at_once_in_one_folder_both_succeed(small):
 
 
 def test_a_build_that_is_killed_while_it_links_is_finished_by_the_next(small, tmp_path):
-    """If a build is killed while it links, the next build must link the program again."""
+    """The next build must link the program again."""
     script = """case "$*" in
 *" -o "*/unit_tests*)
   printf '' > "$(echo "$*" | sed 's/.* -o \\([^ ]*\\) .*/\\1/')"
@@ -87,7 +87,7 @@ esac"""
 
 @pytest.mark.skipif(not PFUNIT_DIR, reason="PFUNIT_DIR names no pFUnit")
 def test_runners_take_turns_in_one_folder(small, tmp_path):
-    """If two test runners use the same folder, each runner must execute its own program."""
+    """Of two test runners in the same folder, each must execute its own program."""
     real = [*[word for word in small if not word.startswith(("shared", "PFUNIT"))]]
     real += ["shared=", f"PFUNIT_DIR={PFUNIT_DIR}"]
     for value, status in ((1, 0), (2, 2), (1, 0)):
@@ -98,7 +98,7 @@ def test_runners_take_turns_in_one_folder(small, tmp_path):
 
 
 def test_a_linker_that_cannot_redirect_gets_no_hints(small, tmp_path):
-    """The test replaces the linker by a script that refuses an option, as some linkers do."""
+    """A script replaces the linker and refuses an option, as some linkers do."""
     refusal = 'case "$*" in *--wrap*) echo unknown option: --wrap >&2; exit 1;; esac'
     compiler = executable(tmp_path / "gfortran", f'{refusal}\nexec gfortran "$@"')
     run = make(*small, f"FC={compiler}")
@@ -145,7 +145,7 @@ def test_a_film_takes_one_command(program, tmp_path):
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    """Yield a folder with all installed files, and uninstall the files afterwards."""
+    """Yield a folder with all installed files, and uninstall them afterwards."""
     root = tmp_path_factory.mktemp("root")
     place = [f"DESTDIR={root}", "PREFIX=/usr"]
     assert make("install", *place).returncode == 0
@@ -169,7 +169,7 @@ def test_an_installed_program_and_its_scripts_run_from_anywhere(installed, tmp_p
 
 
 def test_an_installed_engine_is_found_by_its_module(installed, tmp_path):
-    """The settings of the modulefile are sufficient for C programs and the Python package."""
+    """The settings of the modulefile suffice for C programs and for the Python package."""
     (module,) = (installed / "share/modulefiles/ricochet").iterdir()
     told = dict(re.findall(r"^prepend-path (\w+) {(.+)}$", module.read_text(), re.MULTILINE))
     assert module.read_text().startswith("#%Module") and told["PATH"] == "/usr/bin"
@@ -197,9 +197,9 @@ def test_who_installs_for_others_is_told_that_the_program_is_for_this_processor(
 
 
 def test_only_what_was_installed_goes(tmp_path):
-    """Installation and removal do not change other programs, or files and folders of users.
+    """Installing and uninstalling leave other programs, and files and folders of users, unchanged.
 
-    Several installations of 250 files use 5 to 7 s.
+    Several installations of 250 files take 5 to 7 s.
     """
     prefix = tmp_path / "it's a folder"
     shared, place, program = prefix / "share/ricochet", f"PREFIX={prefix}", prefix / "bin/ricochet"
@@ -246,7 +246,7 @@ def test_only_what_was_installed_goes(tmp_path):
 def test_a_program_that_is_older_than_its_source_is_not_installed(program, tmp_path):
     """An outdated program is neither installed nor rebuilt.
 
-    The program is not rebuilt because the folder may belong to another user.
+    It is not rebuilt because the folder may belong to another user.
     """
     build, prefix = tmp_path / "build", tmp_path / "usr"
     build.mkdir()
@@ -263,7 +263,7 @@ def test_a_program_that_is_older_than_its_source_is_not_installed(program, tmp_p
 
 
 def test_what_the_manual_pages_speak_of_is_installed(installed):
-    """All paths in the manual pages are absolute, and each page has the name of its command."""
+    """All paths in the manual pages are absolute, and each page is named like its command."""
     pages = sorted(path.name for path in (installed / "share/man/man1").iterdir())
     assert pages == ["ricochet-ensemble.1", "ricochet.1"]
     version = ran(installed / "bin/ricochet", "--version").stdout.split()[1]
@@ -301,7 +301,7 @@ def test_what_the_manual_pages_speak_of_is_installed(installed):
 
 @pytest.mark.check
 def test_pip_brings_program_library_package_commands_and_inputs(tmp_path):
-    """The new environment uses packages of the present environment and requires no network."""
+    """The new environment uses packages of the present one and needs no network."""
     own = tmp_path / "venv"
     venv.create(own, symlinks=True)
     python = own / "bin/python"
@@ -330,7 +330,7 @@ def test_pip_brings_program_library_package_commands_and_inputs(tmp_path):
 
 @pytest.mark.parametrize("script", [".ci/set-up", "src/install.sh", "runs/ensemble.sh"])
 def test_scripts_that_need_a_later_bash_say_so(tmp_path, script):
-    """If the version of bash is too old, the script stops before any other action."""
+    """A script stops at once if the version of bash is too old."""
     text = (ROOT / script).read_text()
     limit = re.search(r"BASH_VERSINFO.*>= (404)\b", text).span(1)
     copy = tmp_path / "script"
@@ -341,7 +341,7 @@ def test_scripts_that_need_a_later_bash_say_so(tmp_path, script):
 
 
 def test_the_first_h5fc_that_compiles_is_taken(tmp_path):
-    """The h5fc of conda can name a compiler that is not installed."""
+    """The h5fc of conda may name a compiler that is not installed."""
     system = shutil.which("h5fc", path="/usr/bin")
     if not system:
         pytest.skip("the system has no h5fc")
@@ -355,7 +355,7 @@ def test_the_first_h5fc_that_compiles_is_taken(tmp_path):
 
 
 def test_an_old_python_is_told_before_anything_is_installed(tmp_path):
-    """Nobody is asked for a password in vain."""
+    """Otherwise the user would be asked for a password in vain."""
     (tmp_path / ".ci").mkdir()
     (tmp_path / "bin").mkdir()
     (tmp_path / "src").mkdir()
@@ -371,13 +371,13 @@ def test_an_old_python_is_told_before_anything_is_installed(tmp_path):
     assert "3.10.12" in done.stderr and not (tmp_path / "asked").exists()
 
 
-#: Programs with which .ci/set-up works; gfortran, h5fc and sudo are not among them.
+#: Programs with which .ci/set-up works, without gfortran, h5fc and sudo.
 FEW_TOOLS = "awk bash cat cmp dirname env grep head mkdir mktemp mv rm sed sh sort tail"
 
 
 @pytest.mark.parametrize("apt", [True, False])
 def test_who_cannot_install_packages_is_told_which_are_missing(tmp_path, apt):
-    """Neither sudo nor another system than Debian leads to a message of the shell."""
+    """Neither a missing sudo nor a system other than Debian leads to a message of the shell."""
     (tmp_path / "bin").mkdir()
     for folder in (".ci", "src"):
         (tmp_path / folder).mkdir()

@@ -1,4 +1,4 @@
-"""Test that former public names do not occur outside the table of former names."""
+"""Test that former public names occur only in the table of former names."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""The list of the slowest tests at the end of pytest."""
+"""Tests of the list of the slowest tests that pytest prints at the end."""
 
 import re
 import sys

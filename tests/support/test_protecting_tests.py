@@ -1,4 +1,4 @@
-"""The pages of the folders of src/ name the tests of every source."""
+"""Test that the pages of the folders of src/ name the tests of every source."""
 
 import shutil
 from pathlib import Path

@@ -186,7 +186,7 @@ def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_pa
 
 
 def judged(tmp_path: Path, script: str, suite: str, **variables):
-    """Return how run_unit_tests.sh judges a script that replaces the unit-test program."""
+    """Return the verdict of run_unit_tests.sh on a script that replaces the unit-test program."""
     program, path = executable(tmp_path / "unit_tests", script), tmp_path / "test_it.pf"
     path.write_text(suite)
     judge = SUPPORT / "run_unit_tests.sh"
@@ -315,7 +315,7 @@ def test_a_comment_ends_at_its_column(tmp_path, old, new, most, excess):
 
 @pytest.mark.parametrize(("lines", "is_public", "expected"), [(9, 0, 0), (10, 0, 1), (9, 1, 2)])
 def test_only_small_private_procedures_need_no_comment(tmp_path, lines, is_public, expected):
-    """A public one has a second problem here, because nobody uses it."""
+    """A public procedure has a second problem here, because it is unused."""
     text = MODULE.replace("  !> Twice.\n", "")
     text = text.replace("    twice = 2", "    twice = 1\n" * (lines - 5) + "    twice = 2")
     text = text.replace("private\n", "private\n  public :: twice\n" if is_public else "private\n")
@@ -380,7 +380,7 @@ def test_folders_and_what_they_use_are_those_of_the_picture(tmp_path):
     ],
 )
 def test_imports_of_the_package_are_those_of_its_picture(tmp_path, line, used):
-    """Absolute and relative imports are checked, also inside functions, except in one folder."""
+    """Absolute and relative imports are checked, even inside functions, except within a folder."""
     package = tmp_path / "post" / "ricochet"
     ran("git", "init", "-q", tmp_path, check=True)
     for name in ("__init__", "commands", "reading/reader", "pages/live", "pages/lab"):

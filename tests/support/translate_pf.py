@@ -1,11 +1,11 @@
 """Translate a pFUnit test file (.pf) into Fortran code that uses the module `funit`.
 
-The script accepts only the part of the pFUnit language that the tests need.  It refuses everything
-else, even if pFUnit would accept or silently ignore it.  Therefore every accepted file has the same
-result under pFUnit.  Each line is translated into one line of Fortran; therefore compiler messages
-refer to lines of the .pf file.
-
     python translate_pf.py tests/unit/test_errors.pf build/tests/test_errors.F90
+
+Only the part of the pFUnit language that the tests need is accepted. Everything else is refused,
+even if pFUnit would accept or silently ignore it, so that every accepted file has the same result
+under pFUnit. Each line is translated into one line of Fortran, so that compiler messages refer to
+lines of the .pf file.
 """
 
 import re
@@ -15,18 +15,18 @@ from typing import NamedTuple
 
 
 class Refused(Exception):
-    """Error for a line that is not in the supported part of the language."""
+    """Error for a line outside the supported part of the language."""
 
 
 class Suite(NamedTuple):
-    """The procedures of a test file that the driver calls."""
+    """Procedures of a test file that the driver calls."""
 
     tests: list[str]
     fixtures: dict[str, str]
 
 
 ORDER = "pf_unordered(real(e_, pf_real), real(a_, pf_real), e_ {} a_)"
-# Condition under which an assertion fails; `a_` is the actual value and `e_` the expected value.
+# Condition under which an assertion fails; `a_` is the actual value and `e_` the expected one.
 COMPARISON = {
     "equal": "pf_unequal(e_, a_)",
     "equal within": "pf_apart(e_, a_, {tolerance})",
@@ -40,13 +40,13 @@ SUBROUTINE = re.compile(r"\s*subroutine\s+(\w+)\s*(?:\(\s*\))?\s*(?:!.*)?$", re.
 
 
 def without_strings(line: str) -> str:
-    """Return a line of code without its comment, with strings replaced by blanks."""
+    """Return a line of code without its comment, and with strings replaced by blanks."""
     blanked = re.sub(r"'[^']*'|\"[^\"]*\"", lambda text: " " * len(text[0]), line)
     return blanked.split("!")[0]
 
 
 def split_arguments(text: str) -> list[str]:
-    """Return the list of arguments of a call, split at commas outside brackets and strings."""
+    """Return the arguments of a call, split at commas outside brackets and strings."""
     code = re.sub(r"'[^']*'|\"[^\"]*\"", lambda quoted: " " * len(quoted[0]), text)
     cuts, depth = [-1], 0
     for place, letter in enumerate(code):
@@ -81,14 +81,13 @@ def sort_arguments(text: str) -> tuple[list[str], dict[str, str]]:
 
 
 def assertion(name: str, arguments: str, place: str) -> str:
-    """Return the Fortran code of one `@assert`; `place` is the file and line for messages."""
+    """Return the Fortran code of one `@assert`; `place` is file and line for messages."""
     values, keywords = sort_arguments(arguments)
     message = f", message={keywords['message']}" if "message" in keywords else ""
     kind = name.lower() + (" within" if "tolerance" in keywords else "")
     if kind in COMPARISON:
         expect_count(values, 2)
-        # Double brackets are used because gfortran 14 reports a wrong size for a string in single
-        # brackets.
+        # Double brackets, because gfortran 14 reports a wrong size for a string in single ones.
         check = (
             f"associate (e_ => (({values[0]})), a_ => (({values[1]}))); "
             "if (.not. pf_conform(shape(e_), shape(a_))) then; "
@@ -127,7 +126,7 @@ def translate_line(line: str, place: str) -> str:
 
 
 def find_suite(lines: list[str], stem: str) -> Suite:
-    """Return the tests and fixtures of a file, whose module must have the name of the file."""
+    """Return the tests and fixtures of a file, whose module must be named like the file."""
     modules = [found[1] for line in lines if (found := re.match(r"\s*module\s+(\w+)\s*$", line))]
     if modules != [stem]:
         raise Refused(f"the file must hold one module, named {stem}")
@@ -153,7 +152,7 @@ def find_suite(lines: list[str], stem: str) -> Suite:
 
 
 def translate(source: Path) -> str:
-    """Return the translated module of a file, and the subroutine that runs its tests."""
+    """Return the translated module of a file, with the subroutine that runs its tests."""
     lines = source.read_text().splitlines()
     suite = find_suite(lines, source.stem)
     fortran = [f'# 1 "{source}"']
@@ -175,7 +174,7 @@ def translate(source: Path) -> str:
 
 
 def main() -> int:
-    """Translate the file named on the command line; return 1 if the file is refused."""
+    """Translate the file named on the command line; return 1 if it is refused."""
     source, target = map(Path, sys.argv[1:])
     try:
         target.write_text(translate(source))

@@ -1,9 +1,9 @@
 """Wrap the paragraphs and list items of the pages at 120 characters per line.
 
-    python tests/support/wrap_pages.py            rewrites the pages that are wrapped otherwise
+    python tests/support/wrap_pages.py            rewrites pages that are wrapped differently
     python tests/support/wrap_pages.py --check    only lists these pages
 
-Code, tables, headings, displayed formulas and HTML are not changed.
+Code, tables, headings, displayed formulas and HTML are left unchanged.
 """
 
 import re
@@ -13,20 +13,20 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 WIDTH = 120
 FOLDERS = ("docs", "src", "input", "runs", "post")
-#: Pages that are not wrapped, because scripts write them.
+#: Generated pages, which are not wrapped.
 EXCEPT = re.compile(
     r"docs/(reference/(input|input/\w+|inputs|c|command-line)"
     r"|explanation/validation)\.md"
 )
 ITEM = re.compile(r"( *)([-*+]|\d+[.)]) +(?=\S)")
-#: Lines that are no part of a paragraph, and end one.
+#: Lines that end a paragraph and do not belong to it.
 OTHER = re.compile(r" *(#|\||<|\$\$|!\[|:::|>|\[[^\]]+\]: |={3,}$|-{3,}$)")
 #: Words that would begin another element of the page at the start of a line.
 BEGINS = re.compile(r"([-*+]|\d+[.)]|#+|=+|-+|[|>].*|\$\$.*|<.*|:::.*)$")
 
 
 def pages() -> list[Path]:
-    """Return the pages that are wrapped."""
+    """Return the pages to be wrapped."""
     found = [
         *ROOT.glob("*.md"),
         *(path for name in FOLDERS for path in (ROOT / name).rglob("*.md")),
@@ -35,7 +35,7 @@ def pages() -> list[Path]:
 
 
 def filled(words: list[str], first: str, rest: str) -> list[str]:
-    """Return the lines of a paragraph; `first` and `rest` stand before its lines."""
+    """Return the lines of a paragraph, prefixed by `first` and then by `rest`."""
     lines, line = [], first
     for number, word in enumerate(words):
         fits = len(line) + (number > 0) + len(word) <= WIDTH
@@ -48,7 +48,7 @@ def filled(words: list[str], first: str, rest: str) -> list[str]:
 
 
 def parts_of(text: str) -> list[str]:
-    """Return the words of a paragraph; code and formulas with spaces are one word."""
+    """Return the words of a paragraph; code and formulas with spaces count as one word."""
     joined = re.sub(
         r"(`+)(?:(?!\1).)+\1|(?<!\\)\$[^$]+\$", lambda one: one[0].replace(" ", "\0"), text
     )
@@ -94,7 +94,7 @@ def wrapped(page: str) -> str:
 
 
 def main() -> int:
-    """Wrap or list the pages, and return 1 if `--check` has found one that is wrapped otherwise."""
+    """Wrap or list the pages; return 1 if `--check` finds one that is wrapped differently."""
     check = "--check" in sys.argv[1:]
     other = [path for path in pages() if wrapped(path.read_text()) != path.read_text()]
     for path in other:
