@@ -1,8 +1,8 @@
-"""The physics validation behind `make check`: tables of cases with published or exact references.
+"""Physics validation behind `make check`: tables of cases with published or exact references.
 
-A case consists of the inputs of its runs, a pure function that measures a value from the runs, the
-reference value, the tolerance, and the source of the reference.  `python tests/validate.py` runs
-all cases and writes the report docs/explanation/validation.md.
+A case consists of the inputs of its runs, a pure function that measures a value in these runs, the
+reference value, the tolerance, and the source of the reference. `python tests/validate.py` runs all
+cases and writes the report docs/explanation/validation.md.
 """
 
 from importlib import import_module

@@ -28,7 +28,7 @@ ROUND = Member(
 
 
 def angles(run: Run) -> np.ndarray:
-    """Return the polar angles of the collisions, continuous across 2 pi."""
+    """Return the polar angles of the collisions, unwrapped."""
     x = run.position[1 : len(run.event_log().time) + 1][:, 0]
     return np.unwrap(np.arctan2(x[:, 1], x[:, 0]))
 
@@ -70,8 +70,8 @@ STEPS = Member(
 def miss(run: Run) -> float:
     """Return the largest deviation from the exact path in a right-angled wedge under gravity.
 
-    The distances of the disk from the two walls are independent of each other.  Each is the height
-    of a ball that bounces on a floor with the acceleration g / sqrt(2).
+    The distances of the disk from the two walls are independent of each other. Each is the height
+    of a ball that bounces on a floor under the gravitational acceleration g / sqrt(2).
     """
     t, x = run.time, run.position[:][:, 0]
     normals = np.array(((-1, 1), (1, 1))) / np.sqrt(2)
@@ -91,23 +91,23 @@ def last(run: Run, name: str) -> float:
 
 
 def free_path(run: Run) -> float:
-    """Return the mean free path: the length of the path, at speed 1, per collision."""
+    """Return the mean free path: path length per collision, at speed 1."""
     return run.time[-1] / (last(run, "side_collisions") + last(run, "obstacle_collisions"))
 
 
 def mean_path(radius: float, hole: float) -> float:
     """Return the exact mean free path pi Q / p in the unit box with one scatterer.
 
-    Q and p are the area and the perimeter of the region that the centre of the disk can reach.
+    Q and p are area and perimeter of the region that the centre of the disk can reach.
     """
     a, reach = 1 - 2 * radius, hole + radius
     return pi * (a**2 - pi * reach**2) / (4 * a + 2 * pi * reach)
 
 
-#: A random Lorentz gas: number of scatterers, which may overlap, per area R^2, where R = 1 is the
-#: sum of the radii; number of scatterers; radius of the tracer, whose speed is 1.
+#: A random Lorentz gas of overlapping scatterers: their number per area R^2, where R = 1 is the sum
+#: of the radii; their total number; and the radius of the tracer, which has speed 1.
 DENSITY, SCATTERERS, TRACER = 0.01, 100_000, 0.1
-FREE_TIME = 1 / (2 * DENSITY)  # exact, because overlaps hide the same fraction of rims and area
+FREE_TIME = 1 / (2 * DENSITY)  # exact, because overlaps hide the same fraction of rims and of area
 
 
 @cache
@@ -124,7 +124,7 @@ def scatterers() -> str:
 
 
 def among_scatterers(seed: int) -> str:
-    """Return a run of one tracer with a frame every ten mean free times."""
+    """Return the input of one tracer, with a frame every ten mean free times."""
     side = float(np.sqrt(SCATTERERS / DENSITY))
     return namelist(
         run={"seed": seed}, box={"upper": (side, side), **PERIODIC},
@@ -138,19 +138,20 @@ LORENTZ = tuple(Member(partial(among_scatterers, seed)) for seed in range(1, 5))
 
 
 def free_time(run: Run) -> float:
-    """Return the mean time between the collisions of a tracer."""
+    """Return the mean time between collisions of a tracer."""
     return run.time[-1] / last(run, "obstacle_collisions")
 
 
 def over_boltzmann(run: Run) -> float:
     """Return D / D_0 from the slope of <dx^2> between 10 and 30 mean free times."""
-    x = run.position[:][:-1, 0] + run.image[:][:-1, 0] * run.edges  # the last frame is at the end
+    # the last frame is at the end of the run
+    x = run.position[:][:-1, 0] + run.image[:][:-1, 0] * run.edges
     near, far = (np.mean(np.sum((x[lag:] - x[:-lag]) ** 2, axis=1)) for lag in (1, 3))
     return float((far - near) / (4 * 20 * FREE_TIME) / (3 / (16 * DENSITY)))
 
 
 def boltzmann_over(n: float) -> float:
-    """Return D_0 / D for scatterers that may overlap, from the expansion in their density.
+    """Return D_0 / D for overlapping scatterers, from the expansion in their density.
 
     The coefficients are quoted from memory.
     """
@@ -159,14 +160,14 @@ def boltzmann_over(n: float) -> float:
 
 # --- billiards with arcs ---
 
-#: Radius of the disk in the billiards with arcs.  The radii of the arcs are larger than 1 by BALL,
-#: so that the centre of the disk moves in a billiard with half circles of radius 1.
+#: Radius of the disk in billiards with arcs. The radii of the arcs exceed 1 by BALL, so that the
+#: centre of the disk moves in a billiard with half circles of radius 1.
 BALL = 0.001
 RIM_OF_ARC = 1 + BALL
 
 
 def arc(name: str, centre: tuple, first: float) -> dict:
-    """Return a half circle around the given centre, which begins at the given angle."""
+    """Return a half circle with the given centre, starting at the given angle."""
     angles = {"from_angle": first, "to_angle": first + 180}
     return {"name": name, "centre": centre, "radius": RIM_OF_ARC, **angles}
 
@@ -186,21 +187,20 @@ def stadium(velocity: tuple, events: int) -> Member:
 
 STADIUM = stadium((cos(1.0), sin(1.0)), 2_000_000)
 ALONG_AXIS = stadium((1, 0), 1001)
-#: Area over perimeter of the region that the centre of the disk can reach.
+#: pi times area over perimeter of the region that the centre of the disk can reach.
 STADIUM_PATH = pi * (4 + pi) / (4 + 2 * pi)
-#: A path along the long axis, of length 4 between the arcs, has a stability matrix with trace
-#: 2 - 2 * 4 / 1 = -6, and therefore the stretching factor 3 + sqrt(8) per collision.
+#: The path along the long axis, of length 4 between the arcs, has a stability matrix with the trace
+#: 2 - 2 * 4 / 1 = -6, and thus the stretching factor 3 + sqrt(8) per collision.
 AXIS_EXPONENT = log(3 + sqrt(8)) / 4
 
 
 def stretching(run: Run) -> float:
     """Return the Lyapunov exponent of a path with speed 1, measured from the event log.
 
-    A narrow beam around the path has the curvature B.  Between collisions 1/B grows by the elapsed
-    time t, and the width of the beam by the factor |1 + B t|.  At a collision B grows by
-    2 k / cos(phi), where k = -1/R at the inner face of an arc and 0 at a wall.  The angle phi
-    follows from the impulse 2 m cos(phi).  See Dellago, Posch and Hoover, Physical Review E 53,
-    1485 (1996).
+    A narrow beam around the path has the curvature B. During the time t between collisions, 1/B
+    increases by t, and the beam widens by the factor |1 + B t|. At a collision B increases by 2
+    k / cos(phi), with k = -1/R at the inner face of an arc and 0 at a wall; the impulse 2 m
+    cos(phi) yields phi. See Dellago, Posch and Hoover, Physical Review E 53, 1485 (1996).
     """
     log_, first_wall = run.event_log(), -4 - len(run.obstacles)
     reach = np.array([obstacle.radius - run.radius[0] for obstacle in run.obstacles])
@@ -217,17 +217,17 @@ def stretching(run: Run) -> float:
     return grown / float(flights.sum())
 
 
-#: The mushroom: half the width of the stem, and the depth of the stem below the cap.
+#: The mushroom: half the width of the stem, and its depth below the cap.
 HALF_STEM, DEPTH = 0.4, 1.0
 BULGE = BALL**2 * pi / 4
 
 
 def mushroom(angular_momentum: float, events: int, **output) -> Member:
-    """Return a run in a mushroom, with a path of speed 1 and the given angular momentum.
+    """Return a run in a mushroom, on a path of speed 1 with the given angular momentum.
 
-    The arc is centred one radius of the disk above the underside of the cap.  The centre of the
-    disk therefore moves in an exact half circle of radius 1, in which collisions conserve the
-    magnitude of the angular momentum.
+    The centre of the arc is one disk radius above the underside of the cap. The centre of the disk
+    therefore moves in an exact half circle of radius 1, in which collisions conserve the magnitude
+    of the angular momentum.
     """
     half, rim = HALF_STEM, RIM_OF_ARC
     sides = [(s * rim, BALL, s * rim, 0, s * half, 0, s * half, -DEPTH) for s in (-1, 1)]
@@ -248,7 +248,7 @@ CHAOTIC = mushroom(HALF_STEM - 0.01, 2_000_000, frames_every_events=1)
 
 
 def about_cap(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return height above the centre of the cap and magnitude of the angular momentum (F,)."""
+    """Return height above the centre of the cap, and magnitude of the angular momentum (F,)."""
     away, velocity = run.position[:][:, 0] - (0, BALL), run.velocity[:][:, 0]
     spin = away[:, 0] * velocity[:, 1] - away[:, 1] * velocity[:, 0]
     return away[:, 1], np.abs(spin)
@@ -266,8 +266,8 @@ def regular_path(run: Run) -> list[float]:
 def largest_spin(run: Run) -> float:
     """Return the largest angular momentum of a chaotic path after collisions in the cap.
 
-    A path leaves the underside of the cap or the arc with the angular momentum that it has until it
-    enters the stem.
+    A path leaves the underside of the cap or the arc with an angular momentum that it keeps until
+    it enters the stem.
     """
     height, spin = about_cap(run)
     edge = np.abs(run.position[:][:, 0, 0]) >= HALF_STEM
@@ -275,7 +275,7 @@ def largest_spin(run: Run) -> float:
 
 
 def share_in_cap(run: Run) -> float:
-    """Return the fraction of the time that the disk spends in the cap."""
+    """Return the fraction of time that the disk spends in the cap."""
     height, time = run.position[:][:, 0, 1] - BALL, run.time
     low, high = height[:-1], height[1:]
     step = high - low
@@ -287,9 +287,9 @@ def share_in_cap(run: Run) -> float:
 def chaotic_share() -> float:
     """Return the exact fraction of the chaotic part of phase space that lies in the cap.
 
-    A path in the cap is regular if its angular momentum exceeds half the width b of the stem.  The
-    regular paths fill the area R^2 arccos(b/R) - b sqrt(R^2 - b^2) times 2 pi of the phase space,
-    with R = 1.  In the stem all paths are chaotic.
+    A path in the cap is regular if its angular momentum exceeds half the width b of the stem. For
+    R = 1, the regular paths fill an area R^2 arccos(b/R) - b sqrt(R^2 - b^2) times 2 pi of phase
+    space. In the stem all paths are chaotic.
     """
     b = HALF_STEM
     cap = pi / 2 - (acos(b) - b * sqrt(1 - b * b))

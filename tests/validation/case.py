@@ -1,4 +1,4 @@
-"""A case of the validation, and its verdict: whether the measured values are acceptable."""
+"""Cases of the validation, and their verdicts: whether the measured values are acceptable."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,42 +12,43 @@ from ricochet.analysis.statistics import Estimate, SeriesMean
 
 @dataclass(frozen=True)
 class Member:
-    """One run of the program, whose input may depend on the results of earlier runs."""
+    """Run of the program, whose input may depend on the results of earlier runs."""
 
     text: str | Callable[..., str]
     after: tuple["Member", ...] = ()
-    exit_codes: tuple[int, ...] = (0,)  # read the .part file of a run that stops early
+    exit_codes: tuple[int, ...] = (0,)  # of a run that stops early, the .part file is read
 
 
 class Tolerance(NamedTuple):
-    """Allowed deviation of a measured value from the reference."""
+    """Allowed deviation of a measured value from its reference."""
 
     text: str
-    allowed: Callable[[np.ndarray, np.ndarray], np.ndarray]  # of reference and standard error
+    # function of reference and standard error
+    allowed: Callable[[np.ndarray, np.ndarray], np.ndarray]
     one_sided: int = 0  # +1: only larger values fail, -1: only smaller values fail
 
 
 @dataclass(frozen=True)
 class Case:
-    """A case: one line of the tables of the report."""
+    """Case of the validation: one line in the tables of the report."""
 
     id: str
     what: str
     members: tuple[Member, ...]
-    measure: Callable[..., ArrayLike | Estimate | SeriesMean]  # of the runs of the members
+    measure: Callable[..., ArrayLike | Estimate | SeriesMean]  # function of the runs of the members
     reference: ArrayLike
     tolerance: Tolerance
     source: str
 
 
 class Verdict(NamedTuple):
-    """The value of a case that is closest to its tolerance, and whether all values pass."""
+    """Value of a case that is closest to its tolerance, and whether all values pass."""
 
     case: Case
     values: int
     reference: float
     measured: float
-    error: float  # standard error, zero without an error
+    error: float  # standard error, or 0
     used: float  # deviation over allowed deviation
     problem: str = ""
 
@@ -68,7 +69,7 @@ def relative(deviation: float) -> Tolerance:
 
 
 def sigmas(count: float, deviation: float = np.inf) -> Tolerance:
-    """Return a tolerance of `count` standard errors of the measurement plus a relative one."""
+    """Return a tolerance of `count` standard errors, but at most a relative deviation."""
     text = f"{count:g} sigma" + (f" and {100 * deviation:.3g} %" if deviation < np.inf else "")
     return Tolerance(text, lambda ref, error: np.minimum(count * error, deviation * np.abs(ref)))
 
@@ -79,7 +80,7 @@ AT_LEAST = Tolerance("at least", lambda ref, _: np.zeros_like(ref), -1)
 
 
 def judge(case: Case, runs: list) -> Verdict:
-    """Measure a case; an error fails this case but does not stop the other cases."""
+    """Measure a case; if an error occurs, only this case fails."""
     try:
         result = case.measure(*runs)
     except Exception as problem:
@@ -103,8 +104,8 @@ def judge(case: Case, runs: list) -> Verdict:
 def shares(
     tolerance: Tolerance, measured: np.ndarray, reference: np.ndarray, error: np.ndarray
 ) -> np.ndarray:
-    """Return deviations over allowed deviations; inf if none is allowed, NaN for a value NaN."""
-    same = measured == reference  # infinite values too
+    """Return deviations over allowed deviations: inf if none is allowed, NaN for a value NaN."""
+    same = measured == reference  # including infinite values
     with np.errstate(invalid="ignore", divide="ignore"):
         deviation = np.where(same, 0.0, measured - reference)
         deviation = deviation * tolerance.one_sided if tolerance.one_sided else np.abs(deviation)

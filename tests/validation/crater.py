@@ -1,4 +1,4 @@
-"""Section 10 of the report: craters of projectiles, and random sequential insertion."""
+"""Section 10 of the report: craters, and random sequential insertion."""
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -12,7 +12,7 @@ from .inputs import PERIODIC, ensemble, namelist
 
 
 def crater(count: int, seed: int = 1, mass: float = 25, exit_codes=(0,), **more) -> Member:
-    """Return runs of a bed at a packing fraction of 1/2 and a projectile of five radii."""
+    """Return a run of a projectile of five disk radii and a bed at a packing fraction of 1/2."""
     groups = {
         "contact": {"restitution": 0.5, "contact_time": 2.0**-17},
         "stop": {"energy_fraction": 0.1},
@@ -48,13 +48,13 @@ SCAN = tuple(crater(2000, seed, mass) for mass in MASSES for seed in range(1, 13
 
 
 def rises(*runs: Run) -> np.ndarray:
-    """Return the increases of the mean number of disks hit between masses, over their errors."""
+    """Return the increases of the mean number of disks hit from mass to mass, over their errors."""
     means, errors = hits_of_masses(*runs)
     return np.diff(means) / np.hypot(errors[1:], errors[:-1])
 
 
 def straightness(*runs: Run) -> float:
-    """Return the correlation coefficient of the mean number of disks hit and the mass."""
+    """Return the correlation coefficient of the mean number of disks hit with the mass."""
     return float(np.corrcoef(MASSES, hits_of_masses(*runs).mean)[0, 1])
 
 
@@ -64,19 +64,19 @@ def hits_of_masses(*runs: Run) -> Estimate:
 
 
 def hit_less_bound(run: Run) -> float:
-    """Return the disks hit minus the bound M (1/f - 1), if no disk reached the sides."""
+    """Return the number of disks hit minus M (1/f - 1), provided that none reached the sides."""
     if np.sum(run.observable("side_collisions").value[-1]) > 0:
         raise ValueError("a disk has hit a side")
     return hit(run) - 25 * (1 / 0.1 - 1)
 
 
 def fraction_left(run: Run) -> np.ndarray:
-    """Return the energy after each event, divided by the initial energy."""
+    """Return the energy after each event, relative to the initial energy."""
     lost = run.observable("dissipated_energy").value
     return 1 - lost / run.observable("total_energy").value[0]
 
 
-# Without the TC model an inelastic collapse occurs before the energy has decreased to a tenth.
+# Without the TC model, inelastic collapse occurs before the energy has fallen to a tenth.
 NO_TC = tuple(
     crater(2000, seed, exit_codes=(0, 4), contact={"contact_time": 0}, output={"event_log": False})
     for seed in range(1, 13)
@@ -113,7 +113,7 @@ BED = 10000
 
 
 def inserted(packing: float) -> tuple[Member, ...]:
-    """Return the initial states of periodic boxes that are filled at random."""
+    """Return the initial states of periodic boxes filled at random."""
     return ensemble(
         8,
         box=PERIODIC,
@@ -122,7 +122,7 @@ def inserted(packing: float) -> tuple[Member, ...]:
 
 
 def free_part(*runs: Run, probes: int = 200_000) -> float:
-    """Return the mean fraction of the area in which a further disk can be inserted."""
+    """Return the mean fraction of the area in which another disk can be inserted."""
     parts = []
     for run in runs:
         tree = cKDTree(run.position[0], boxsize=run.edges)
@@ -139,7 +139,7 @@ FILLED = tuple(member for packing in GRID for member in inserted(packing))
 def attempts(*runs: Run) -> list[float]:
     """Return attempts times disk area up to the packing fractions 0.1, 0.2, ..., 0.5.
 
-    The result is the integral of 1 / `free_part` over the packing fraction.
+    This is the integral of 1 / `free_part` over the packing fraction.
     """
     free = [1.0, *(free_part(*runs[k : k + 8]) for k in range(0, len(runs), 8))]
     inverse = PchipInterpolator([0, *GRID], -np.log(free))

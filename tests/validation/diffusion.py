@@ -1,6 +1,6 @@
 """Section 14 of the report: velocity autocorrelation and diffusion.
 
-Frames are written in single precision, because seven digits of a velocity are sufficient here.
+Frames are written in single precision, because seven digits of a velocity suffice here.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ def rate(eta: float) -> float:
 
 
 def watched(seeds: int, eta: float, step: float, frames: int) -> tuple[Member, ...]:
-    """Return an input with frames `step` mean free times apart."""
+    """Return runs with frames `step` mean free times apart."""
     interval = step / rate(eta)
     return gases(
         seeds, N, packing_fraction=eta, periodic=True, temperature=1.0,
@@ -54,7 +54,7 @@ def half_and_one(run: Run) -> list[float]:
 
 
 def enskog_ratio(run: Run) -> float:
-    """Return the slope of <dx^2> / 4 between w t = 8 and 28, divided by Enskog's value."""
+    """Return the slope of <dx^2> / 4 between w t = 8 and 28, relative to Enskog's value."""
     t, msd, _ = found(run, np.array([8, 28]))["msd"]
     kt = np.sum(run.kinetic_energy(0)) / (run.n_disks - 1)
     eta = 0.05

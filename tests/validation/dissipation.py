@@ -67,7 +67,7 @@ SOFT = {
 
 
 def late_exponent(run: Run) -> float:
-    """Return p of K ~ t^-p at times of thousands of initial mean free times."""
+    """Return p of K ~ t^-p after thousands of initial mean free times."""
     time, energy = run.observable("all/kinetic_energy")
     return exponent(time, energy)
 
@@ -79,7 +79,7 @@ def over_the_law(run: Run) -> float:
 
 
 def fall(run: Run) -> float:
-    """Return the decrease of the temperature in powers of ten."""
+    """Return by how many powers of ten the temperature decreases."""
     kt = run.observable("all/temperature").value
     return float(np.log10(kt[0] / kt[-1]))
 
@@ -88,7 +88,7 @@ SLOW = 0.99999
 
 
 def slow_loss(rule: str) -> tuple[Member, ...]:
-    """Return gases that lose energy to the walls so slowly that they stay in equilibrium."""
+    """Return gases that lose energy to the walls so slowly that they remain in equilibrium."""
     return gases(
         30, 1000, radius=0.001, temperature=1.0,
         contact={"restitution": 1, "wall_restitution": SLOW, "wall_rule": rule},
@@ -97,7 +97,7 @@ def slow_loss(rule: str) -> tuple[Member, ...]:
 
 
 def loss_per_hit(run: Run) -> float:
-    """Return the mean energy lost per collision with a side, divided by (1 - xi^2) kT."""
+    """Return the mean energy loss per collision with a side, in units of (1 - xi^2) kT."""
     energy = run.observable("total_energy").value
     hits = run.observable("side_collisions").value.sum(axis=1)
     return -log(energy[-1] / energy[0]) * run.n_disks / hits[-1] / (1 - SLOW**2)
@@ -206,7 +206,7 @@ def since_last(run: Run) -> np.ndarray:
 
 
 def flagged(run: Run) -> np.ndarray:
-    """Return for which events a partner had an event within the last contact time."""
+    """Return which events follow an event of one of the partners within the contact time."""
     return since_last(run) < run.parameter("contact", "contact_time")
 
 
@@ -277,7 +277,7 @@ def line_of_three(xi: float, places: tuple, velocities: tuple, time: float) -> M
 def symmetric(*factors: float) -> tuple[Member, ...]:
     """Return runs in which the outer of three disks approach at equal speeds, one slightly later.
 
-    The restitution is a factor times the critical restitution of collapse.
+    The restitution is a factor times the critical restitution of inelastic collapse.
     """
     return tuple(
         line_of_three(factor * CRITICAL, (0.3, 0.5, 0.7001), (1, 0, -1), 100.0)

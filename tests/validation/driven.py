@@ -21,7 +21,7 @@ FLUX = sqrt(2 / pi) * sqrt(HOT * COLD) * (sqrt(HOT) - sqrt(COLD))
 
 
 def between_walls(turning: bool) -> tuple[Member, ...]:
-    """Return a run of one disk, smooth or rough, in a box that is periodic along the walls."""
+    """Return runs of one disk, smooth or rough, in a box that is periodic along the walls."""
     spin = {"angular_velocity": 1.0} if turning else {}
     return ensemble(
         10,
@@ -34,13 +34,13 @@ def between_walls(turning: bool) -> tuple[Member, ...]:
 
 
 def rate(run: Run, name: str) -> float:
-    """Return the final value of a cumulative observable, divided by the time."""
+    """Return the final value of a cumulative observable per time."""
     time, value = run.observable(name)
     return float(value[-1] / time[-1])
 
 
 def flux(run: Run) -> float:
-    """Return the heat that flows from left to right per time."""
+    """Return the heat flowing from left to right per time."""
     return (rate(run, "sides/left/energy_to_disks") - rate(run, "sides/right/energy_to_disks")) / 2
 
 
@@ -58,24 +58,24 @@ HEATED = ensemble(
 
 
 def energies(run: Run) -> np.ndarray:
-    """Return the total energies after the equilibration."""
+    """Return the total energies after equilibration."""
     time, energy = run.observable("total_energy")
     return energy[time >= 100]
 
 
 def maxwell_p(*runs: Run) -> float:
-    """Return the p-value of a test of all speeds against Maxwell's distribution at T."""
+    """Return the p-value of a test of all speeds against the Maxwell distribution at T."""
     speeds = [run.speed(slice(1, None)).ravel() * np.sqrt(1 / (2 * KT)) for run in runs]
     return goodness_of_fit(np.concatenate(speeds), maxwell_cdf).ks_p
 
 
 # --- rough disks that cool ---
 
-ETA, ROUGH_COUNT = 0.0025, 20000  # dilute, because the references apply to the dilute limit
+ETA, ROUGH_COUNT = 0.0025, 20000  # dilute, because the references are for the dilute limit
 
 
 def cooling(xi: float, beta: float) -> tuple[Member, ...]:
-    """Return dilute cooling gases that start with the steady ratio of temperatures."""
+    """Return dilute cooling gases that start with the steady temperature ratio."""
     edge = sqrt(ROUGH_COUNT * pi / 4 / ETA)
     return ensemble(
         6,
@@ -105,7 +105,7 @@ FLOWING = 200
 
 
 def flowing(eta: float, size: float, mass: float) -> tuple[Member, ...]:
-    """Return gases of two equally numerous species; the first has the diameter and mass 1."""
+    """Return gases of two equally numerous species, the first with diameter and mass 1."""
     edge = sqrt(FLOWING * pi / 8 * (1 + size**2) / eta)
     own = np.full(2, FLOWING / 2 / edge**2), np.array([1, size]), np.array([1, mass])
     memory = mixtures.enskog_mixture(hd.henderson(eta), *own)["memory"]
@@ -123,7 +123,7 @@ def flowing(eta: float, size: float, mass: float) -> tuple[Member, ...]:
 
 
 def enskog_ratios(*runs: Run) -> Estimate:
-    """Return the viscosities and, for equal disks, the conductivity over Enskog's values."""
+    """Return the viscosities and, for equal disks, the conductivity relative to Enskog's values."""
     found = of_moments(list(runs), [start_of_equilibrium(run) for run in runs])
     means = [combine_runs(found[name].members) for name in MOMENTS if name in found]
     return Estimate(*(np.array([getattr(one, k) for one in means]) for k in ("mean", "error")))

@@ -28,14 +28,14 @@ PACKINGS = tuple(round(0.05 * k, 2) for k in range(1, 11))
 
 
 def bulk(eta: float) -> tuple[Member, ...]:
-    """Return periodic gases; runs in which the pressure is also tested are longer."""
+    """Return periodic gases, in longer runs where the pressure is tested as well."""
     seeds = 4 if eta in (0.1, 0.3, 0.5) else 1
     return long_gases(seeds, N, 4000, packing_fraction=eta, periodic=True)
 
 
 def reduced_rate(run: Run) -> SeriesMean:
     """Return the collision rate w at kT = m = 1."""
-    scale = sqrt(run.n_disks / (run.n_disks - 1))  # speeds are sqrt(2), total momentum 0
+    scale = sqrt(run.n_disks / (run.n_disks - 1))  # speeds are sqrt(2), and the total momentum is 0
     return collision_rate(run).scaled(1 / scale)
 
 
@@ -82,7 +82,8 @@ BULK = [
 
 # --- walls ---
 
-WALLED = {  # radius: w, collision rate of all sides, force on a side, length in collisions per disk
+# by radius: w, collision rate of all sides, force on a side, length in collisions per disk
+WALLED = {
     0.001: (7.118, 1608.5, 1008.33, 4000),
     0.004: (30.93, 1784, 1118.4, 20000),
     0.007: (65.30, 2279, 1424.6, 25000),
@@ -109,7 +110,7 @@ def two_exact(s: float) -> list[float]:
     a, n, energy = 1 - s, 2, 2.0
     q = a**4 - pi * s**2 * a**2 + 8 / 3 * s**3 * a - s**4 / 2
     dq_ds = -(2 * pi * s * a**2 - 8 * s**2 * a + 2 * s**3)
-    dq_da = 2 * a**3 - pi * s**2 * a + 4 / 3 * s**3  # a and b apart, then a = b
+    dq_da = 2 * a**3 - pi * s**2 * a + 4 / 3 * s**3  # derivative with respect to one edge
     u = sqrt(2 * energy) * gamma(n) / (sqrt(pi) * gamma(n + 0.5))
     return [-dq_ds / q * u / sqrt(2), 2 * dq_da / q * u, dq_da / q * energy / n]
 
@@ -143,7 +144,7 @@ IDENTITIES = tuple(
 
 
 def identity_terms(run: Run) -> tuple[float, float, float]:
-    """Return wall pressure, virial pressure and the term d(sum m x v) / (2 K t) of a whole run."""
+    """Return wall pressure, virial pressure, and the term d(sum m x v) / (2 K t) of a whole run."""
     work = 2 * np.sum(run.kinetic_energy(0)) * run.time[-1]
     impulse, a = run.observable("side_impulse").value[-1], run.edges - 2 * run.radius[0]
     wall = (impulse[:2].mean() * a[0] + impulse[2:].mean() * a[1]) / work
@@ -206,13 +207,13 @@ def species_rates(run: Run) -> np.ndarray:
 
 
 def over_equation_of_state(run: Run) -> SeriesMean:
-    """Return Z from the virial, divided by its prediction for the radii of the run."""
+    """Return Z from the virial, relative to its prediction for the radii of the run."""
     eta, alike = packing(run), np.mean(run.radius) ** 2 / np.mean(run.radius**2)
     return z_virial(run).scaled(1 / float(hd.of_sizes(hd.simulated_finite(eta, N), eta, alike)))
 
 
 def polydisperse(eta: float, law: str, spread: float) -> tuple[Member, ...]:
-    """Return periodic gases of polydisperse disks whose masses are proportional to their areas."""
+    """Return periodic gases of polydisperse disks with masses proportional to their areas."""
     size = {"polydispersity": spread, "radius_distribution": law, "mass_scaling": "area"}
     return long_gases(2, N, 2000, packing_fraction=eta, periodic=True, **size)
 
@@ -253,7 +254,7 @@ def dense(count: int, eta: float, tau: float) -> tuple[Member, ...]:
     return long_gases(2, count, tau, **more)
 
 
-#: A triangular crystal that is commensurate with its periodic box.
+#: A triangular crystal commensurate with its periodic box.
 COLUMNS, ROWS = 30, 32
 CRYSTAL = long_gases(
     1, COLUMNS * ROWS, 4000, packing_fraction=0.80, placement="lattice",
@@ -261,7 +262,7 @@ CRYSTAL = long_gases(
 )  # fmt: skip
 
 
-# Packing fraction: P d^2 / kT of 870 disks in a square box.
+# By packing fraction: P d^2 / kT of 870 disks in a square box.
 NEAR_FREEZING = {0.67: 7.986779, 0.69: 8.969898}
 
 DENSE = [

@@ -1,4 +1,4 @@
-"""Measurements that several sections use, as pure functions of a run."""
+"""Measurements used in several sections, as pure functions of a run."""
 
 from collections.abc import Callable
 
@@ -22,27 +22,26 @@ def each(measure: Callable[[Run], ArrayLike]) -> Callable[..., np.ndarray]:
 
 
 def over(measure: Callable[[Run], ArrayLike]) -> Callable[..., Estimate]:
-    """Return a function for the mean of a measurement over runs, and the error of the mean."""
+    """Return a function that averages a measurement over runs, with the error of the mean."""
     return lambda *runs: estimate([measure(run) for run in runs])
 
 
 def pooled(measure: Callable[[Run], SeriesMean]) -> Callable[..., SeriesMean]:
-    """Return a function for the mean over runs whose means have errors."""
+    """Return a function that averages the means of runs with their errors."""
     return lambda *runs: combine_runs([measure(run) for run in runs])
 
 
 def middle(measure: Callable[[Run], ArrayLike]) -> Callable[..., np.ndarray]:
-    """Return a function for the median over independent runs.
+    """Return a function that takes the median over independent runs.
 
-    The median is used for tests that reject one correct sample in a hundred.  The median of three
-    correct runs is rejected about once in 3000 cases, whereas a wrong distribution is detected in
-    every run.
+    Tests reject one correct sample in a hundred. The median of three correct runs is rejected only
+    about once in 3000 cases, whereas a wrong distribution is detected in every run.
     """
     return lambda *runs: np.median([measure(run) for run in runs], axis=0)
 
 
 def several(means: list[SeriesMean]) -> Estimate:
-    """Return several means as one mean whose value is a vector."""
+    """Combine several means into one with a vector value."""
     return Estimate(*np.array([(one.mean, one.error) for one in means]).T)
 
 

@@ -30,24 +30,24 @@ def final(run: Run) -> np.ndarray:
 
 
 def square_path(start=(0.5, 0.25), contact=None, **stop) -> Member:
-    """Return a run of a disk whose path closes after four collisions with elastic walls."""
+    """Return a run of a disk whose path between elastic walls closes after four collisions."""
     return few(disk(start, (1, 1), 0.1), contact=contact, **stop)
 
 
 def dropped(height: float, events: int, speed=(0, 0), contact=None) -> Member:
-    """Return a run of a disk that falls onto the floor."""
+    """Return a run of a disk falling onto the floor."""
     box = FALLING | {"upper": (40, 16)}
     return few(disk((1, height), speed, SMALL), box=box, contact=contact, events=events)
 
 
 def impacts(xi: float, count: int) -> np.ndarray:
-    """Return the exact times of the impacts after a fall from the height 1."""
+    """Return the exact times of the impacts after a fall from height 1."""
     flights = np.append(0.5, xi ** np.arange(1, count))
     return 2 * sqrt(2 / 9.81) * np.cumsum(flights)
 
 
 def until_rest(xi: float) -> int:
-    """Return the number of impacts before the first flight that is shorter than 1e-12."""
+    """Return the number of impacts before the first flight shorter than 1e-12."""
     return int(np.ceil(log(1e-12 / (2 * sqrt(2 / 9.81))) / log(xi)))
 
 
@@ -57,12 +57,12 @@ def dissipating(run: Run) -> int:
 
 
 def last_flight(run: Run) -> float:
-    """Return the mean duration of the flights after the last loss of energy."""
+    """Return the mean duration of the flights after the last energy loss."""
     return float(np.diff(run.event_log().time[dissipating(run) - 1 :]).mean())
 
 
 def apexes(run: Run) -> np.ndarray:
-    """Return the largest heights of the centre that follow from the speeds after the impacts."""
+    """Return the largest heights of the centre, calculated from the speeds after the impacts."""
     return run.position[1:][:, 0, 1] + run.velocity[1:][:, 0, 1] ** 2 / (2 * 9.81)
 
 
@@ -74,9 +74,9 @@ REST_TIMES = [1.35457092295719, 4.06371276887158, 8.57894917872889, 17.609421998
 
 
 def bouncing(rule: str = "velocity", vx: float = 0) -> tuple[Member, ...]:
-    """Return runs of falling disks, for the restitutions `REST`, until they are at rest.
+    """Return runs of falling disks with the restitutions `REST`, until they are at rest.
 
-    The last bounces are lower than the spacing of the coordinates, so that the exit code is 4.
+    The exit code is 4, because the last bounces are lower than the spacing of coordinates.
     """
     laws = ({"wall_restitution": xi, "wall_rule": rule} for xi in REST)
     runs = (dropped(1.04, until_rest(law["wall_restitution"]), (vx, 0), law) for law in laws)
@@ -241,7 +241,7 @@ SLOWING = [
 
 
 def scattered(b: float) -> Member:
-    """Return a run of case P3; the heavy disk is at y = 0, so that `b` is not rounded."""
+    """Return a run of case P3, with the heavy disk at y = 0, so that `b` is not rounded."""
     heavy, light = disk((0.5, 0), (0, 0), 0.1, 1e6), disk((0.2, b), (1, 0), 0.001)
     return few(heavy, light, box={"lower": (0, -0.5), "upper": (1, 0.5)}, collisions=1, time=0.7)
 
@@ -290,7 +290,7 @@ ROD_COUNTS = {1: [54, 8], 10: [566, 95], 100: [5606, 959]}
 
 
 def rod_counts(run: Run, frame: int) -> list[int]:
-    """Return the numbers of pair collisions and of wall collisions at each sample."""
+    """Return the numbers of pair collisions and of wall collisions up to a sample."""
     walls = run.observable("side_collisions").value[frame]
     return [run.observable("collisions").value[frame], walls.sum()]
 

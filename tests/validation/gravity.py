@@ -21,7 +21,7 @@ START = 20.0  #: time after which the gas is in equilibrium
 def boxes(
     seeds: int | Iterable[int], v0: float, time: float, observed: float = 1.0, run=None, **output
 ) -> tuple[Member, ...]:
-    """Return runs of 30 + 30 disks that start in the lower half, at heights of at most 8."""
+    """Return runs of 30 + 30 disks that start in the lower half, at heights up to 8."""
     return ensemble(
         seeds, run=run or {}, box={"upper": (8, 16), "gravity": (0, -G)},
         species=[
@@ -71,7 +71,7 @@ def kinetic(run: Run) -> float:
 
 
 def share(run: Run) -> float:
-    """Return the ratio <K_A> / <K_B> of the kinetic energies of the species."""
+    """Return the ratio <K_A> / <K_B> of the kinetic energies of the two species."""
     return float(settled(run, "A/kinetic_energy").mean() / settled(run, "B/kinetic_energy").mean())
 
 
@@ -89,7 +89,7 @@ SCAN_KT = {0.1: 0.7302, 0.5: 0.7318, 1: 0.7366, 2: 0.7561}
 
 
 def at_energy(mean: float) -> Callable[[Run], float]:
-    """Return a function that measures kT of a run, corrected to the mean energy of all seeds."""
+    """Return a function that measures kT of a run, corrected to the mean energy over all seeds."""
     kt = temperature_of(mean)
     return lambda run: kinetic(run) + kt - temperature_of(start_energy(run))
 
@@ -150,7 +150,7 @@ def of(run: Run, name: str, values: np.ndarray) -> np.ndarray:
 
 
 def square_distances(run: Run) -> list[float]:
-    """Return the KS distance of v^2 from its predicted distribution, times sqrt(n), by species."""
+    """Return the KS distance of v^2 from its predicted distribution times sqrt(n), by species."""
     found = []
     for name in MASS:
         energy = of(run, name, run.kinetic_energy(later(run))).ravel()
@@ -160,7 +160,7 @@ def square_distances(run: Run) -> list[float]:
 
 
 def slopes(run: Run) -> list[float]:
-    """Return slopes d ln p / dy over m g / kT, fitted without the layers at floor and ceiling."""
+    """Return d ln p / dy over m g / kT, fitted without the layers at floor and ceiling."""
     heights, kt = run.position[later(run)][..., 1], kinetic(run)
     low, high = 1.0, 13.0
     found = []
@@ -172,7 +172,7 @@ def slopes(run: Run) -> list[float]:
 
 
 def exponent(mean: float, length: float) -> float:
-    """Return k for which the density exp(-k y) on 0..length has this mean."""
+    """Return k for which the density exp(-k y) between 0 and `length` has the given mean."""
     return brentq(lambda k: 1 / k - length / np.expm1(k * length) - mean, 1e-3, 10)
 
 
@@ -203,11 +203,11 @@ CONTACTS = {(0.025, 0.025): 0.21, (0.025, 0.05): 0.50, (0.05, 0.05): 0.29}  #: f
 
 
 def too_short(q: float) -> float:
-    """Return the fraction of collisions that time steps miss, for steps of q contact distances.
+    """Return the fraction of collisions missed by time steps of q contact distances.
 
     A collision is detected if a step ends while the disks overlap and still approach each other, on
-    the first half of the chord.  For uniformly distributed impact parameters b and phases, the
-    result is the mean of 1 - sqrt(1 - b^2) / q where that is positive.  (If overlaps of separating
+    the first half of the chord. For uniformly distributed impact parameters b and phases, the
+    result is the mean of 1 - sqrt(1 - b^2) / q where this is positive. (If overlaps of separating
     disks were detected as well, q / 2 would replace q.)
     """
     if q >= 1:
@@ -216,7 +216,7 @@ def too_short(q: float) -> float:
 
 
 def missed(kt: float, dt: float) -> float:
-    """Return the mean of `too_short` over pairs and over relative speeds of collisions in a gas.
+    """Return the mean of `too_short` over pairs, and over relative speeds of collisions in a gas.
 
     The density of the relative speeds g is proportional to g^2 exp(-mu g^2 / 2kT).
     """
@@ -230,7 +230,7 @@ def missed(kt: float, dt: float) -> float:
 
 
 def rate_ratio(stepped: Run, exact: Run) -> float:
-    """Return the collision rate over its expected value, for runs of equal energies."""
+    """Return the collision rate over its expected value, for runs of equal energy."""
     expected = 1 - missed(kinetic(stepped), stepped.parameter("run", "dt"))
     return pair_rate(stepped) / pair_rate(exact) / expected
 

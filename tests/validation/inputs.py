@@ -12,20 +12,20 @@ ROOT_2 = 1.4142135623730951  #: speed at which K = m, so that kT = 1 for m = 1
 
 
 def namelist(**groups: dict | list[dict]) -> str:
-    """Return groups of variables as text; a list of dictionaries is a repeated group."""
+    """Return groups of variables as text; a list of dictionaries stands for a repeated group."""
     return program.namelist(groups)
 
 
 def ensemble(seeds: int | Iterable[int], *, run: dict = {}, **groups) -> tuple[Member, ...]:  # noqa: B006
-    """Return runs of one input with the given seeds; a number n stands for 1 to n."""
+    """Return runs of one input with the given seeds, where n stands for 1 to n."""
     seeds = range(1, seeds + 1) if isinstance(seeds, int) else seeds
     return tuple(Member(namelist(run={"seed": seed} | run, **groups)) for seed in seeds)
 
 
 def gases(seeds: int | Iterable[int], count: int, *, periodic=False, **more) -> tuple[Member, ...]:
-    """Return an input of `count` equal disks with speeds sqrt 2, so that kT = 1 between walls.
+    """Return runs of `count` equal disks with speeds sqrt 2, so that kT = 1 between walls.
 
-    An argument in `more` that names a group, such as stop or contact, defines that group; all other
+    An argument in `more` that names a group, such as stop or contact, defines this group; all other
     arguments are variables of the species.
     """
     groups = {"box": PERIODIC if periodic else {}}
@@ -37,7 +37,7 @@ def gases(seeds: int | Iterable[int], count: int, *, periodic=False, **more) -> 
 
 
 def light_and_heavy(seeds: int | Iterable[int], radius: float, **groups) -> tuple[Member, ...]:
-    """Return a gas of equal sizes and speeds; half of the disks have four times the mass."""
+    """Return gases of equal sizes and speeds; half of the disks have four times the mass."""
     disks = {"count": 500, "radius": radius, "speed": 1.0}
     species = [{"name": "light", **disks}, {"name": "heavy", "mass": 4.0, **disks}]
     return ensemble(seeds, species=species, **groups)

@@ -25,8 +25,7 @@ STRENGTH = 0.002
 def heated(xi: float) -> tuple[Member, ...]:
     """Return heated gases that start at the predicted temperature.
 
-    There are ten kicks per mean free time, and the sampling times are not multiples of their
-    interval.
+    There are ten kicks per mean free time; the sampling times are not multiples of their interval.
     """
     edge = sqrt(HEATED_COUNT * pi / 4 / ETA)
     kt = hd.noise_temperature(STRENGTH, xi, ETA, 1.0)
@@ -65,9 +64,9 @@ def steady_kurtosis(run: Run) -> float:
 def diffusion(run: Run) -> float:
     """Return D, from the slope of <dr^2> between 6 and 18 mean free times, over its prediction.
 
-    The prediction is Enskog's D times 2 / (1 + xi): to first order a collision changes a mean
-    velocity by (1 + xi) / 2 of the change in an elastic collision; V. Garzo, Physica A 343, 105
-    (2004), for equal disks.
+    The prediction is Enskog's D times 2 / (1 + xi), because to first order a collision changes a
+    mean velocity by (1 + xi) / 2 of the elastic change; V. Garzo, Physica A 343, 105 (2004), for
+    equal disks.
     """
     time = run.time[run.n_frames // 5 : -1]
     lags = (time[1] - time[0]) * np.array([2, 6])
@@ -82,7 +81,7 @@ FREE_COUNT, KICK = 100, 1.0
 
 
 def free(frames_every: int, kicks: int, **drive) -> tuple[Member, ...]:
-    """Return a run of very small driven disks; `drive` contains the variables of the input."""
+    """Return runs of very small driven disks, where `drive` holds the variables of the driving."""
     return ensemble(
         8,
         box={"upper": (100, 100), **PERIODIC},
@@ -114,7 +113,7 @@ SWIMMING = free(
 
 
 def memory(run: Run) -> list[float]:
-    """Return <v(0) v(t)> at the lags, divided by 2 kT / m."""
+    """Return <v(0) v(t)> at the lags, in units of 2 kT / m."""
     v = run.velocity[:]
     return [float(np.mean(v[k:] * v[: len(v) - k])) * MASS / BATH for k in (0, *LAGS)]
 
@@ -140,11 +139,11 @@ def headings(run: Run) -> list[float]:
 
 
 def swum(kicks: int) -> float:
-    """Return <|dr|^2> of an active disk that flies straight from kick to kick.
+    """Return <|dr|^2> of an active disk flying straight from kick to kick.
 
-    The n directions of the flights are u_1 ... u_n with <u_i u_j> = exp(-D_r |i - j| interval); for
-    short intervals the result is 4 D t + 2 (v / D_r)^2 (D_r t - 1 + exp(-D_r t)), Howse et al.,
-    Phys. Rev. Lett. 99, 048102 (2007).
+    The directions u_1 ... u_n of the flights have <u_i u_j> = exp(-D_r |i - j| interval). For short
+    intervals the result is 4 D t + 2 (v / D_r)^2 (D_r t - 1 + exp(-D_r t)), Howse et al., Phys.
+    Rev. Lett. 99, 048102 (2007).
     """
     i = np.arange(kicks)
     together = np.exp(-TURN * KICK * np.abs(i[:, None] - i)).sum()
@@ -157,7 +156,7 @@ PAIRS = 100
 
 
 def bathed(kind: str, **drive) -> tuple[Member, ...]:
-    """Return a dense mixture of perfectly rough disks that starts at another temperature."""
+    """Return dense mixtures of perfectly rough disks that start at another temperature."""
     edge = sqrt(PAIRS * pi * (0.5**2 + 0.8**2) / 0.3)
     return ensemble(
         8,
@@ -177,7 +176,7 @@ def bathed(kind: str, **drive) -> tuple[Member, ...]:
 
 
 def shares(run: Run) -> list[float]:
-    """Return <m v^2 / 2> and <I omega^2> of both species, over the temperature of the bath."""
+    """Return <m v^2 / 2> and <I omega^2> of both species over the temperature of the bath."""
     return [
         factor * float(run.observable(f"{species}/{what}").value[100:].mean()) / BATH
         for species in ("light", "heavy")

@@ -1,4 +1,4 @@
-"""Published results that only the validation uses; symbols as in `ricochet.hard_disks`."""
+"""Published results used only in the validation, with the symbols of `ricochet.hard_disks`."""
 
 import math
 
@@ -8,7 +8,7 @@ from ricochet import hard_disks as hd, mixtures
 
 
 def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:
-    """Return w_ij, the collisions of a disk of species i with disks of species j per time."""
+    """Return w_ij, the rate of collisions of a disk of species i with disks of species j."""
     s, n, m = (np.asarray(a, dtype=float) for a in (diameters, density, masses))
     pair = (s[:, None] + s) / 2
     reduced = 2 * math.pi * kt * (1 / m[:, None] + 1 / m)
@@ -22,11 +22,11 @@ def noise_kurtosis(xi: float) -> float:
 
 
 def sheared_grains(xi: float) -> tuple[float, float, float]:
-    """Return shear rate, stress -P_xy and P_yy of a dilute inelastic gas in steady uniform shear.
+    """Return shear rate, -P_xy and P_yy of a dilute inelastic gas in steady uniform shear.
 
-    The unit of the shear rate is nu = 2 sqrt(pi) n sigma sqrt(T / m); the unit of the stresses is
-    the pressure.  Santos, Garzo and Dufty, Phys. Rev. E 69, 061303 (2004), in two dimensions: the
-    stress relaxes at the rate beta nu, and the cooling rate is zeta nu.
+    The shear rate is in units of nu = 2 sqrt(pi) n sigma sqrt(T / m), the stresses in units of the
+    pressure. Santos, Garzo and Dufty, Phys. Rev. E 69, 061303 (2004), in two dimensions: the stress
+    relaxes at the rate beta nu, and the cooling rate is zeta nu.
     """
     beta, zeta = (1 + xi) / 2 * (1 - (1 - xi) / 4), (1 - xi**2) / 2
     rate = math.sqrt(zeta / beta) * (beta + zeta)

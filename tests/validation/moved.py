@@ -42,8 +42,8 @@ def leaving(run: Run) -> np.ndarray:
 def shaken(xi: float, strength: float) -> Member:
     """Return a run that starts close to the periodic orbit with one bounce per period.
 
-    The floor oscillates with the period 1.  A disk that leaves the floor at the velocity 1/2 flies
-    for one period if the velocity of the floor is then (1 - xi) / (1 + xi) / 2.
+    The floor oscillates with period 1. A disk that leaves the floor at the velocity 1/2 flies for
+    one period if the floor then has the velocity (1 - xi) / (1 + xi) / 2.
     """
     amplitude = strength / (2 * pi) ** 2
     phase = acos((1 - xi) / (1 + xi) / 2 / (2 * pi * amplitude))

@@ -34,11 +34,12 @@ EFFUSION = ensemble(
 def effusion(run: Run) -> float:
     """Return the rate over n v D / pi, with the mean speed v = sqrt(pi kT / 2 m).
 
-    The law applies to an opening that is much narrower than the mean free path, 1.8, and than the
-    chamber.  An opening of 0.05 has a rate that is 2 % higher.
+    The law applies to openings much narrower than the mean free path, 1.8, and than the chamber;
+    the rate through an opening of 0.05 is 2 % higher.
 
-    The centres of the disks pass an opening that is narrower by a diameter, and have less room.  A
-    disk that has left waits half an interval on average until it is recycled.
+    Since disks have a finite size, the opening for their centres is narrower by a diameter, and the
+    area that they can reach is smaller. A disk that has left waits half an interval on average
+    before it is recycled.
     """
     time, count = run.observable("recycled")
     kt = run.observable("all/temperature").value[10:].mean()
@@ -53,7 +54,7 @@ SETTLED = 4.0  # time after which the discharge is steady
 
 
 def hopper(width: float) -> Member:
-    """Return a hopper with walls at 45 degrees and a mouth of the given width."""
+    """Return a hopper with walls inclined by 45 degrees and a mouth of given width."""
     low = 0.1 + width / 2
     return Member(
         namelist(

@@ -1,11 +1,12 @@
-"""Section 16 of the report: dense starts that event chains equilibrate.
+"""Section 16 of the report: dense initial states equilibrated by event chains.
 
-No part of a run is left out as equilibration, and several starts are averaged.  The published
-pressures are for the same number of disks and the same shape of the box, so no finite-size shift
-enters, with one exception: for 4096 disks at packing 0.698 the reference is that for 256^2 disks
-(Engel et al., Physical Review E 87, 042134 (2013), 9.1708).  Published values for 870 and 128^2
-disks are 9.1341 and 9.1741 (Li et al., Journal of Chemical Physics 157, 234111 (2022)), so the
-shift of 4096 disks lies between -0.4 and +0.04 %; in proportion to 1/N it is -0.08 %.
+No part of a run is discarded as equilibration, and several initial states are averaged. The
+published pressures are for the same number of disks and the same shape of the box, so that no
+finite-size correction is needed, with one exception: for 4096 disks at a packing fraction of 0.698
+the reference is that for 256^2 disks (Engel et al., Physical Review E 87, 042134 (2013), 9.1708).
+Published values for 870 and 128^2 disks are 9.1341 and 9.1741 (Li et al., Journal of Chemical
+Physics 157, 234111 (2022)), so that the correction for 4096 disks lies between -0.4 and +0.04 %; if
+proportional to 1/N, it is -0.08 %.
 """
 
 from math import pi, sqrt
@@ -34,29 +35,30 @@ def starts(
 
 
 def pressure(run: Run) -> float:
-    """Return P d^2 / kT from the virial of a whole run; kT follows from N - 1 free velocities."""
+    """Return P d^2 / kT from the virial of a whole run, with kT from N - 1 free velocities."""
     kt = np.sum(run.kinetic_energy(0)) / (run.n_disks - 1)
     z = 1 + run.observable("virial").value[-1] / (2 * run.n_disks * kt * run.time[-1])
     return z * run.n_disks * (2 * run.radius[0]) ** 2 / np.prod(run.edges)
 
 
 def order(run: Run) -> float:
-    """Return the global orientational order of the start: the modulus of the mean of psi6."""
+    """Return the global bond-orientational order of the start, the modulus of the mean psi6."""
     return abs(bond_order(run, 0).mean())
 
 
-#: Height of the box over its width, and P d^2 / kT at packing 0.73, of 72 disks.
+#: Height of the box over its width, and P d^2 / kT at a packing fraction of 0.73, for 72 disks.
 SMALL = {8 * sqrt(3) / 18: 9.52740, 1.0: 10.08124}
-#: The same for a box in which the crystal has several orientations that change rarely into each
-#: other.  The start therefore needs ten times as many sweeps, and pressures of starts differ more.
+#: The same for a box in which the crystal has several orientations, between which it rarely
+#: changes. The initial state therefore requires ten times as many sweeps, and the pressures of
+#: initial states differ more.
 TURNING = (sqrt(3) / 2, 11.40956)
-#: Packing fraction: P d^2 / kT of 870 disks in a square box, and collisions per disk of a run, in
-#: which fluctuations that are slow near melting are averaged.
+#: By packing fraction: P d^2 / kT of 870 disks in a square box, and the collisions per disk of a
+#: run, long enough to average the slow fluctuations near melting.
 SQUARE = {0.69: (8.969898, 2000), 0.698: (9.13414, 6000)}
 
 
 def mixture(seeds: int) -> tuple[Member, ...]:
-    """Return the starts of 1000 disks, half of which are 1.4 times as large, at packing 0.80."""
+    """Return states of 1000 disks, half of them 1.4 times as large, at packing fraction 0.80."""
     small = sqrt(0.80 / (500 * pi * (1 + 1.4**2)))
     species = [
         {"name": name, "count": 500, "radius": radius, "placement": "relaxed", "temperature": 1.0}

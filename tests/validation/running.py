@@ -1,4 +1,4 @@
-"""Perform the runs of the cases in parallel, and measure each case once its runs are finished."""
+"""Execute the runs of the cases in parallel, and measure each case once its runs are finished."""
 
 import hashlib
 import re
@@ -15,17 +15,17 @@ MOST_SECONDS = 1200
 
 
 class Workshop:
-    """Performs the run of each member once, several runs at a time, in one folder."""
+    """Executes the run of each member once, several runs at a time, in one folder."""
 
     def __init__(self, program: Path, folder: Path, jobs: int, seed_shift: int = 0):
-        """Store the settings; `seed_shift` is added to all seeds and so changes all runs."""
+        """Store the settings; `seed_shift` is added to all seeds."""
         self.program, self.folder, self.seed_shift = program, folder, seed_shift
         self.pool = ThreadPoolExecutor(jobs)
         self.futures: dict[Member, Future] = {}
         folder.mkdir(parents=True, exist_ok=True)
 
     def order(self, member: Member) -> Future:
-        """Return the future result of a member; members that it depends on are run first."""
+        """Return the future result of a member, after starting any members on which it depends."""
         for earlier in member.after:
             self.order(earlier)
         if member not in self.futures:
@@ -33,7 +33,7 @@ class Workshop:
         return self.futures[member]
 
     def make(self, member: Member) -> Run:
-        """Perform the run of a member; raise RunError if its exit code is not the expected one."""
+        """Execute the run of a member; raise RunError if its exit code is not an expected one."""
         text = member.text
         if callable(text):
             text = text(*(self.futures[earlier].result() for earlier in member.after))
@@ -43,7 +43,7 @@ class Workshop:
         output = path.with_suffix(".h5")
         command = [self.program, path, "-o", output, "--force", "--quiet"]
         if self.seed_shift:
-            seed = re.search(r"\bseed = (\d+)", text)  # 1 is the program's default
+            seed = re.search(r"\bseed = (\d+)", text)  # 1 is the default of the program
             command += ["--set", f"run.seed={int(seed[1] if seed else 1) + self.seed_shift}"]
         ended = subprocess.run(
             command, capture_output=True, text=True, check=False, timeout=MOST_SECONDS

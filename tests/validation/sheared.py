@@ -19,7 +19,7 @@ COUNT = 500
 
 
 def heating(eta: float) -> tuple[Member, ...]:
-    """Return gases that shear heats from T = 1 to about 4.
+    """Return gases heated by shear from T = 1 to about 4.
 
     The shear rate is a thirtieth of the initial collision rate.
     """
@@ -42,7 +42,7 @@ def viscosity(eta: float) -> float:
 
 
 def heated_by_shear(eta: float) -> Callable[[Run], float]:
-    """Return the growth of sqrt(T), divided by the growth for Enskog's viscosity.
+    """Return the growth of sqrt(T), relative to the growth for Enskog's viscosity.
 
     In n dT/dt = (viscosity) gamma^2 the viscosity is proportional to sqrt(T), so that sqrt(T) grows
     linearly in time.
@@ -59,11 +59,11 @@ def heated_by_shear(eta: float) -> Callable[[Run], float]:
 # --- a dilute inelastic gas in which heating by shear balances dissipation ---
 
 GRAINS, ETA = 1000, 0.0025
-FREQUENCY = 2 * sqrt(pi) * 4 * ETA / pi  # the unit of rates at T = 1
+FREQUENCY = 2 * sqrt(pi) * 4 * ETA / pi  # unit of rates at T = 1
 
 
 def steady(xi: float) -> tuple[Member, ...]:
-    """Return sheared gases at the shear rate for which theory predicts T = 1."""
+    """Return sheared gases at the shear rate for which the theory predicts T = 1."""
     edge = sqrt(GRAINS * pi / 4 / ETA)
     gamma = sheared_grains(xi)[0] * FREQUENCY
     return ensemble(
@@ -80,8 +80,8 @@ def steady(xi: float) -> tuple[Member, ...]:
 def of_steady_shear(run: Run) -> list[float]:
     """Return shear rate, -P_xy and P_yy in units of the theory, after 50 collisions per disk.
 
-    Only the kinetic part of the stress is included, because the collisional part is smaller by a
-    factor of the order of the packing fraction.
+    Only the kinetic part of the stress is included; the collisional part is smaller by a factor of
+    the order of the packing fraction.
     """
     late = slice(50, None)
     place, v = run.position[late], run.velocity[late]
@@ -100,7 +100,7 @@ BETWEEN, CELLS = 800, 20
 
 
 def between(eta: float, temperatures: tuple[float, float], speed: float) -> tuple[Member, ...]:
-    """Return gases between two thermal walls, which slide in opposite directions."""
+    """Return gases between two thermal walls sliding in opposite directions."""
     edge = sqrt(BETWEEN * pi / 4 / eta / 2)
     return ensemble(
         8,
@@ -119,7 +119,7 @@ def between(eta: float, temperatures: tuple[float, float], speed: float) -> tupl
 
 
 def drop(name: str) -> Callable[[Run], float]:
-    """Return the change of a field over the middle half of the box, over its prediction."""
+    """Return the change of a field over the middle half of the box, relative to its prediction."""
 
     def measure(run: Run) -> float:
         own, x = fields([run], None, (CELLS, 1)), places(run, (CELLS, 1))[:, 0]

@@ -15,7 +15,7 @@ from .case import AT_MOST, Case, Member, relative, sigmas, within
 from .estimators import at_collisions, middle, over
 from .inputs import PERIODIC, ensemble, gases, light_and_heavy
 
-LEAST = 1.63  #: KS distance times sqrt(n); larger values have a probability below 1 %
+LEAST = 1.63  #: KS distance times sqrt(n) that is exceeded with a probability of 1 %
 
 
 def after(run: Run, tau: float) -> slice:
@@ -24,7 +24,7 @@ def after(run: Run, tau: float) -> slice:
 
 
 def reduced(run: Run, tau: float = 15) -> np.ndarray:
-    """Return the speeds of the frames in equilibrium, divided by sqrt(2 K / N)."""
+    """Return the speeds in the frames in equilibrium, over sqrt(2 K / N)."""
     v = run.speed(after(run, tau))
     return (v / sqrt(np.mean(v**2))).ravel()
 
@@ -36,9 +36,9 @@ def obeyed(
     sample: Callable[[Run], tuple],
     source: str = "D",
 ) -> Case:
-    """Return a case that tests a sample of values from a run against a distribution function.
+    """Return a case that compares a sample of values from a run with a distribution function.
 
-    The function `sample` returns both for a run.
+    `sample` returns both for a run.
     """
 
     def distance(run: Run) -> float:
@@ -57,14 +57,14 @@ def uniform(u: np.ndarray) -> np.ndarray:
 
 
 def sampled(count: int, radius: float, interval: float, frames: int) -> tuple[Member, ...]:
-    """Return runs with frames at equal intervals of time."""
+    """Return runs with equally spaced frames."""
     time = interval * frames
     output = {"frames_every_time": interval, "observables_every_time": time / 400}
     return gases(3, count, radius=radius, stop={"time": time}, output=output)
 
 
-LARGE = sampled(1000, 0.004, 0.17, 200)  # 5 collisions per disk apart
-FINITE = {  # N: frames 5 collisions per disk apart
+LARGE = sampled(1000, 0.004, 0.17, 200)  # frames are 5 collisions per disk apart
+FINITE = {  # by N: frames are 5 collisions per disk apart
     10: sampled(10, 0.02, 3.2, 20000),
     100: sampled(100, 0.01, 0.62, 6000),
 }
@@ -75,12 +75,12 @@ def large(run: Run) -> tuple:
 
 
 def finite(run: Run) -> tuple:
-    """Return reduced speeds and their distribution for N disks that share a fixed energy."""
+    """Return reduced speeds, and their distribution for N disks sharing a fixed energy."""
     return reduced(run), finite_n_cdf(run.n_disks)
 
 
 def component(run: Run) -> tuple:
-    """Return the fractions m vx^2 / 2E and their distribution, Beta(1/2, N - 1/2)."""
+    """Return the fractions m vx^2 / 2E, and their distribution, Beta(1/2, N - 1/2)."""
     share = run.velocity[after(run, 15)][..., 0].ravel() ** 2 / (2 * run.n_disks)
     return share, stats.beta(0.5, run.n_disks - 0.5).cdf
 
@@ -133,7 +133,7 @@ def approach_speeds(run: Run) -> tuple:
 
 
 def contacts(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Direction of contact [turns of the mirror image] and |b| / s of the pair collisions."""
+    """Return direction of contact [turns of the mirror image] and |b| / s of pair collisions."""
     log = run.event_log()
     at = np.flatnonzero(log.j > 0)
     i, j = log.i[at] - 1, log.j[at] - 1
@@ -217,7 +217,7 @@ def ratios(*runs: Run) -> np.ndarray:
 
 
 def exchanging(mass: float) -> tuple[Member, ...]:
-    """Return dilute gases whose light and heavy disks have Maxwell's velocities of unequal kT."""
+    """Return dilute gases whose light and heavy disks have Maxwellian velocities of unequal kT."""
     disks = {"count": 30000, "radius": 0.0005}
     light = {"name": "light", "temperature": 0.1, **disks}
     heavy = {"name": "heavy", "temperature": 1.0, "mass": mass, **disks}
@@ -228,10 +228,10 @@ def exchanging(mass: float) -> tuple[Member, ...]:
 
 
 def exchanged(run: Run) -> float:
-    """Return the share of the difference of kT that a light-heavy collision exchanges on average.
+    """Return the fraction of the difference of kT exchanged on average in a light-heavy collision.
 
-    The difference is the mean of its values at the start and at the end of a run that is so short
-    that the velocities remain Maxwell's.
+    The difference is averaged over the start and the end of a run so short that the velocities
+    remain Maxwellian.
     """
     log, v, mass = run.event_log(), run.velocity[0].copy(), run.mass
     gained, mixed = 0.0, 0

@@ -82,7 +82,7 @@ LISTED, RELABELLED = (
 
 
 def boost_error(run: Run, boosted: Run) -> float:
-    """Return the largest difference of collision times and of positions after shifting back."""
+    """Return the largest difference of collision times, and of positions after shifting back."""
     if len(run.event_log().time) < 90:
         raise ValueError("too few collisions")
     apart = boosted.unwrapped(-1) - BOOST * SHORT - run.unwrapped(-1)
@@ -99,7 +99,7 @@ def label_error(run: Run, relabelled: Run) -> float:
 
 # --- reversal ---
 
-REVERSALS = {  # N, radius: collisions per disk and log10 of the rms error
+REVERSALS = {  # by N and radius: collisions per disk, and log10 of the rms error
     (100, 0.01): {1: -13.6, 2: -11.2, 4: -6.3, 6: -2.2},
     (100, 0.025): {4: -13.4, 8: -10.6, 12: -7.4, 16: -4.5, 20: -1.7},
     (64, 0.04): {10: -11.9, 20: -6.9, 30: -2.3},
@@ -108,7 +108,7 @@ SAMPLES = 30
 
 
 def onward(run: Run) -> str:
-    """Return the input of the same run that stops between events, at nine tenths of its time."""
+    """Return the input of the same run, ending between events at nine tenths of its time."""
     return explicit(
         run.position[0], run.velocity[0], float(run.radius[0]), 0.9 * run.time[-1], periodic=False
     )
@@ -122,7 +122,7 @@ def backward(run: Run) -> str:
 
 
 def there_and_back(count: int, radius: float, tau: int) -> Iterator[Member]:
-    """Return pairs of runs: one of about `tau` collisions per disk, then its reversal."""
+    """Yield pairs of runs: one of about `tau` collisions per disk, and its reversal."""
     longer = {"collisions": round(tau / 0.9 * count / 2)}
     for timed in gases(SAMPLES, count, radius=radius, temperature=1.0, stop=longer):
         there = Member(onward, (timed,))

@@ -32,7 +32,7 @@ def verdict(value, reference, tolerance) -> bool:
     ("names", "number"), [(QUICK, 60), pytest.param(AVERAGES, 8, marks=pytest.mark.statistics)]
 )
 def test_exact_cases_hold(program, tmp_path, names, number):
-    """The quick cases use 8 s, because they are 63 cases with 111 runs of the program."""
+    """The quick cases take 8 s, because they are 63 cases with 111 runs of the program."""
     cases = [case for case in CASES if case.id.startswith(names)]
     verdicts = list(validate(cases, program, tmp_path, jobs=2))
     assert len(verdicts) == len(cases) > number
