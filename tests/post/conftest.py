@@ -24,9 +24,9 @@ def rng():
 
 @pytest.fixture
 def simulated(ricochet, tmp_path, made_once):
-    """Return a function that simulates an input file or the text of an input.
+    """Return a function that simulates a system given by an input file or its text.
 
-    Each system is simulated once in a session, and each test gets a copy of the output file.
+    Each system is simulated once per session; each test receives a copy of the output file.
     """
 
     def run(system, *settings, name="gas"):
@@ -38,7 +38,7 @@ def simulated(ricochet, tmp_path, made_once):
             assert done.returncode == FINISHED, done.stderr
 
         text, output = f"{path.read_text()}{settings}", tmp_path / f"{name}.h5"
-        if re.search(r"\bfile *=", text):  # the file may have another content the next time
+        if re.search(r"\bfile *=", text):  # the file may have different content the next time
             simulate(output)
         else:
             shutil.copy(made_once(text, simulate), output)
@@ -65,7 +65,7 @@ def browser(chromium):
 
 @pytest.fixture
 def playing(browser, tmp_path):
-    """Return a function that makes the player of a run and opens it in the paused state."""
+    """Return a function that makes the player of a run and opens it, paused."""
 
     def play(path, *options):
         assert run_script("player", path, "-o", tmp_path / "film.html", *options) == 0
@@ -86,14 +86,14 @@ def address(program, tmp_path_factory):
 
 @pytest.fixture
 def opened(browser, address):
-    """Return the browser with a new page of the laboratory when its first run moves."""
+    """Return the browser with a new page of the laboratory, once its first run moves."""
     browser.open(address)
     yield moving(browser)
     assert browser.complaints() == []
     browser.open("about:blank")  # ends the runs
 
 
-#: Settings of the gases that the fixture `bulk` simulates.
+#: Settings of the gases simulated by the fixture `bulk`.
 RUNS = (
     ("species.disks.packing_fraction=0.05", "output.frames_every_time=0.04"),
     ("species.disks.packing_fraction=0.3", "output.frames_every_time=0.02"),
@@ -107,7 +107,7 @@ RUNS = (
 
 @pytest.fixture
 def bulk(simulated):
-    """Simulate small gases at two packing fractions and a cooling gas."""
+    """Simulate small gases at two packing fractions, and a cooling gas."""
     settings = ["species.disks.count=100", "stop.collisions_per_disk=60"]
     settings += ["output.observables_every_collisions=25", "output.event_log=true"]
     system = ROOT / "input" / "bulk.nml"

@@ -1,9 +1,9 @@
-"""Inputs and settings of periodic gases that several test files share."""
+"""Inputs and settings of periodic gases, shared by several test files."""
 
 #: Boundaries of a synthetic run in a periodic box.
 PERIODIC = (True, True)
 
-#: Input of a periodic gas; the fixture `gas` inserts the settings of `USUAL`.
+#: Input of a periodic gas, into which the fixture `gas` inserts the settings of `USUAL`.
 GAS = """&run seed = {seed} / &box boundary = {sides} /
 &species count = {count} packing_fraction = {packing} temperature = 2 mass = 3 /
 &contact restitution = {restitution} / &stop collisions_per_disk = {length} /
@@ -15,5 +15,5 @@ USUAL = {
     "cadence": "frames_every_time = 0.05 observables_every_time = 0.02",
 }  # fmt: skip
 
-#: Packing fraction in `GAS` that adds a second species with another mass and number of disks.
+#: Packing fraction in `GAS`, followed by a second species with another mass and number of disks.
 UNLIKE = "0.1 mass = {} temperature = 2 / &species name = 'b' packing_fraction = 0.1 count = {}"

@@ -1,4 +1,4 @@
-"""The laboratory as a process, and a client that uses it as the page of a browser does."""
+"""The laboratory as a process, and a client that uses it like a page in a browser."""
 
 import asyncio
 import base64
@@ -21,7 +21,7 @@ HEAD = 7  # numbers before the positions
 def laboratory(program, folder, *words, **options):
     """Start a laboratory with a folder for temporary files; yield its process and address.
 
-    Without the option --port it has a port that is free.
+    Without the option --port it chooses a free port.
     """
     own = os.environ | {"RICOCHET": str(program), "TMPDIR": str(folder)}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
@@ -36,7 +36,7 @@ def laboratory(program, folder, *words, **options):
 
 
 class Film:
-    """A client with one run that uses its socket as the page of a browser does."""
+    """Client with one run that uses its socket like a page in a browser."""
 
     def __init__(self, session, socket, address):
         """Store the open connection."""
@@ -44,7 +44,7 @@ class Film:
         self.frames, self.last = 0, {}
 
     async def say(self, do, **more):
-        with suppress(ConnectionError):  # earlier answers are still read
+        with suppress(ConnectionError):  # earlier answers can still be read
             await self.socket.send_json({"do": do, **more})
 
     async def start(self, name="gas", settings=None, added=(), pace=0.1):

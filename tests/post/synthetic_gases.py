@@ -1,11 +1,11 @@
-"""Synthetic runs of gases that several test files of this folder use."""
+"""Synthetic runs of gases, shared by several test files of this folder."""
 
 import numpy as np
 
 from ricochet import statistics
 from synthetic_run import maxwell_velocities, write_run
 
-TWO = statistics.student(2)  # Student's factor of the error of two runs
+TWO = statistics.student(2)  # Student's factor for the error of two runs
 
 
 def gas(path, rng, count=200, frames=41, mass=1.0, **more):
@@ -24,7 +24,7 @@ def gas(path, rng, count=200, frames=41, mass=1.0, **more):
 
 
 def cooled(path, xi, decay, heavy=2.0, seed=1, points=101):
-    """Write energies that decay with collisions; the heavy species is `heavy` times as hot."""
+    """Write energies that decay with collisions, with a heavy species `heavy` times as hot."""
     t = np.linspace(0, 1, points) ** 2
     total, x = np.exp(-decay * t), np.zeros((1, 4, 2))
     observables = {
@@ -39,7 +39,7 @@ def cooled(path, xi, decay, heavy=2.0, seed=1, points=101):
 
 
 def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0, seed=1, hits=15):
-    """Write an ideal gas in equilibrium under gravity with `hits` pair collisions per frame."""
+    """Write an ideal gas in equilibrium under gravity, with `hits` pair collisions per frame."""
     mass, r = np.repeat([0.025, 0.05], 30), 0.04
     height = r + rng.exponential(temperature / (mass * 9.81), (frames, 60))
     x = np.stack([rng.uniform(r, 8 - r, (frames, 60)), height], axis=-1)

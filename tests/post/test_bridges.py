@@ -1,4 +1,4 @@
-"""Runs are exchanged with OVITO, MDAnalysis, GSD, LAMMPS, freud, pandas, xarray and CSV."""
+"""Exchange of runs with OVITO, MDAnalysis, GSD, LAMMPS, freud, pandas, xarray and CSV."""
 
 import random
 import re
@@ -16,7 +16,7 @@ from synthetic_run import ROOT, run_script
 
 
 def reader(module: str):
-    """Return a module, or skip the test and state how to install the module."""
+    """Return a module, or skip the test with a message how to install it."""
     return pytest.importorskip(
         module, reason=f"{module} is not installed (requirements.txt, tests/readers.txt)"
     )
@@ -24,7 +24,7 @@ def reader(module: str):
 
 @pytest.fixture
 def run(simulated) -> Run:
-    """Return a run of two species in a container whose lower corner is not the origin."""
+    """Return a run of two species in a container whose lower corner is not at the origin."""
     words = ("stop.collisions_per_disk=2", "species.light.count=20", "box.boundary=periodic,wall")
     return simulated(ROOT / "input/container.nml", *words)
 
@@ -58,7 +58,7 @@ def test_ovito_opens_the_export_as_a_system_in_two_dimensions(run):
 
 
 def test_ovito_sees_the_displaced_images_of_a_sheared_box(simulated):
-    """Neighbours in the tilted lattice have the distance at which disks collide, or are farther."""
+    """Neighbours in the tilted lattice are no closer than colliding disks."""
     words = ("box.shear_rate=1", "box.boundary=periodic,periodic", "stop.collisions_per_disk=3")
     run = simulated(ROOT / "input/lab.nml", "stop.events=", *words)
     pipeline = reader("ovito.io").import_file(str(exported(run, "run.xyz")))
@@ -148,7 +148,7 @@ READERS = {"gsd": bridges.read_gsd, "lammpstrj": bridges.read_lammps}
 
 @pytest.fixture(params=WRITERS)
 def kind(request) -> str:
-    """Return the format of a file; the test is skipped if its package is missing."""
+    """Return a file format, skipping the test if its package is missing."""
     if request.param == "gsd":
         reader("gsd.hoomd")
     return request.param
@@ -156,7 +156,7 @@ def kind(request) -> str:
 
 @pytest.fixture
 def rough(simulated) -> Run:
-    """Return a run of rough disks of two species in a box whose right side moves inwards."""
+    """Return a run of rough disks of two species in a box with an inward moving right side."""
     return simulated(
         "&box lower = -1, 2 upper = 1, 5 boundary = 'wall', 'periodic' / "
         "&side name = 'right' motion = 'constant_velocity' velocity = 0.5 end_time = 0.5 / "
@@ -182,13 +182,13 @@ def test_frames_return_from_files_with_every_bit(run, rough, kind):
             exact |= {name: frame.per_disk(name) for name in one.disk_data}
             for name, values in exact.items():
                 np.testing.assert_array_equal(found.disks[name], values)
-            # A GSD file contains positions relative to the centre of the box.
+            # In a GSD file positions are relative to the centre of the box.
             apart = found.disks["position"] - frame.position
             assert np.abs(apart).max() <= (1e-15 if kind == "gsd" else 0)
 
 
 def test_ovito_opens_gsd_and_lammps_files(run, rough, kind):
-    """OVITO is an independent reader of both formats."""
+    """OVITO reads both formats independently."""
     opened = reader("ovito.io").import_file
     for one in (run, rough):
         pipeline = opened(str(exported(one, f"{one.path.stem}.{kind}")))
@@ -249,7 +249,7 @@ def test_the_package_gsd_reads_what_is_written(run, tmp_path):
 
 
 def test_a_simulation_starts_from_an_imported_frame(run, kind, tmp_path):
-    """A simulation that continues from a file has the same collisions as the original run."""
+    """Its collisions are those of the original run."""
     direct = {"box": {"lower": run.lower, "upper": run.upper, "boundary": ["periodic", "wall"]}}
     direct["species"] = [
         {"name": one.name, "position": run.position[-1][one.disks],
@@ -274,7 +274,7 @@ def test_a_simulation_starts_from_an_imported_frame(run, kind, tmp_path):
 
 
 def test_dump_files_of_lammps_itself_are_read(tmp_path):
-    """The fields are in any order, scaled or unwrapped; ids are not in order; there is no time."""
+    """Columns are in any order, scaled or unwrapped; ids are unordered; the time is missing."""
     head = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n3\nITEM: BOX BOUNDS {} {} pp\n"
     head += "-1.0e+00 1.0e+00\n0 4\n-0.5 0.5\nITEM: ATOMS "
     rows = "id type xs ys zs vx vy diameter\n3 2 0.5 0.25 0.5 1 2 0.2\n1 1 0 1 0.5 3 4 0.1\n"
@@ -368,7 +368,7 @@ def test_a_dump_file_with_impossible_numbers_is_answered_in_one_line(old, new, t
 
 @pytest.fixture
 def damaged(kind, run, tmp_path):
-    """Return a function that damages an exported file by a change of its bytes, and reads it."""
+    """Return a function that changes bytes of an exported file and reads it."""
     whole = exported(run, f"run.{kind}").read_bytes()
     path = tmp_path / f"damaged.{kind}"
 
@@ -381,7 +381,7 @@ def damaged(kind, run, tmp_path):
 
 @pytest.mark.filterwarnings("error")
 def test_a_damaged_file_is_answered_in_one_line_or_read(damaged, kind):
-    """Bytes are changed at random, most of them in the header and in the index of a GSD file."""
+    """Bytes are changed at random, mostly in the header and the index of a GSD file."""
     rng = random.Random(1)
 
     def spoil(content):
@@ -407,7 +407,7 @@ def test_a_damaged_file_is_answered_in_one_line_or_read(damaged, kind):
 
 @pytest.mark.parametrize("group", ["particles", "bonds", "pairs"])
 def test_a_gsd_file_that_counts_too_many_members_is_refused(group, tmp_path):
-    """The package gsd would fill arrays of that size with default values."""
+    """The package gsd would fill arrays of this size with default values."""
     reader("gsd.hoomd")
     layer = reader("gsd.fl")
     path = tmp_path / "a.gsd"

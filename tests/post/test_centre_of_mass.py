@@ -1,4 +1,4 @@
-"""Noise that moves the centre of mass changes no result about the motion of the disks."""
+"""Noise that accelerates the centre of mass does not affect results on the motion of the disks."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from ricochet import correlations, equilibrium, fields, speeds
 from ricochet.reading.nature import Refused
 
 LOOSE = "drive.keep_momentum=.false."
-#: Boxes and species of several kinds; a few collisions per disk, before rounding errors grow.
+#: Boxes and species of several kinds, for a few collisions per disk, before rounding errors grow.
 GAS = """&run seed = {seed} / &box upper = 1, {height} boundary = 'periodic', '{y}'
 shear_rate = {shear} /
 &species count = {n} packing_fraction = {eta} temperature = 1 mass = 2 /
@@ -18,7 +18,7 @@ shear_rate = {shear} /
 
 
 def drawn(rng, **given) -> str:
-    """Return the input of a gas that noise heats."""
+    """Return the input of a gas heated by noise."""
     values = {"seed": rng.integers(10**6), "height": rng.uniform(0.5, 2), "n": rng.integers(5, 40)}
     values |= {"eta": rng.uniform(0.01, 0.2), "strength": rng.uniform(1, 100), "y": "periodic"}
     return GAS.format(**values | {"xi": rng.choice([1.0, 0.9]), "shear": 0} | given)
@@ -26,7 +26,7 @@ def drawn(rng, **given) -> str:
 
 @pytest.mark.parametrize("case", range(7))
 def test_motion_is_relative_to_a_centre_of_mass_that_noise_moves(simulated, case):
-    """Kicks without their mean cause the same relative motion (Galilean invariance)."""
+    """Kicks with and without their mean cause the same relative motion (Galilean invariance)."""
     rng = np.random.default_rng(case)
     text = drawn(rng, shear=2.0 * (case == 6))
     held, loose = simulated(text, name="held"), simulated(text, LOOSE, name="loose")

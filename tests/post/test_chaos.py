@@ -44,9 +44,9 @@ def test_lyapunov_finds_the_rate_of_divergence(tmp_path, rng, capsys):
 
 
 def tracer(path, rng, radii=(0.4, 0.4), walk=0.3, frames=20001):
-    """Write a random walk in a box of two scatterers with a frame every 10 mean free times.
+    """Write a random walk in a box with two scatterers, with a frame every 10 mean free times.
 
-    With R = 0.5 and two scatterers in 2 x 2 the density n R^2 is 1/8, the mean free time 2.
+    With R = 0.5 and two scatterers in 2 x 2, the density n R^2 is 1/8 and the mean free time 2.
     """
     step = rng.normal(scale=walk, size=(frames, 1, 2))
     place = np.cumsum(step, axis=0) + 1

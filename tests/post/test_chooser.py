@@ -1,4 +1,4 @@
-"""The inputs of the laboratory: their pictures, descriptions and sliders."""
+"""Inputs of the laboratory: their pictures, descriptions and sliders."""
 
 import importlib.util
 import re
@@ -33,7 +33,7 @@ def test_every_input_has_its_place_in_the_chooser_and_a_picture_of_now():
         assert shown == pictures.digest(path, own["at"]), message
 
 
-#: Settings with which the start of an input takes less time.
+#: Settings with which an input starts faster.
 CHEAPER = {"hexatic": {"species.disks.relaxation_sweeps": 1}}
 
 
@@ -56,7 +56,7 @@ def test_both_ends_of_each_slider_run(path, monkeypatch, program):
 
 
 def test_the_links_of_the_lesson_lead_to_the_inputs_with_these_titles():
-    """Other values than those of the input are values of its sliders, and each heading has one."""
+    """Values that differ from the input are values of its sliders, and each heading has one."""
     text = (ROOT / "docs/tutorials/lesson.md").read_text()
     shown = set()
     for title, link in re.findall(r"\[([^\]]+)\]\((http://[^)]+)\)", text):

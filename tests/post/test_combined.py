@@ -15,7 +15,7 @@ def with_parameter(run, group, name, value):
 
 
 def test_runs_that_differ_in_physics_are_combined_with_a_warning(tmp_path, rng):
-    """The seed, the title, the output and the rule that ends a run are no physics."""
+    """Seed, title, output and stop condition do not count as physics."""
     same = [ricochet.read_run(gas(tmp_path / f"{k}.h5", rng)) for k in range(2)]
     for group, name in (("run", "title"), ("stop", "events"), ("output", "precision")):
         for k, run in enumerate(same):
@@ -31,7 +31,7 @@ def test_runs_that_differ_in_physics_are_combined_with_a_warning(tmp_path, rng):
 
 
 def test_curves_of_two_wall_rules_are_drawn_apart(tmp_path):
-    """The title names both, and so do the rows of the table and the columns of the data."""
+    """The title, the rows of the table and the columns of the data name both."""
     runs = [ricochet.read_run(cooled(tmp_path / f"{k}.h5", 0.9, 0.1, seed=k)) for k in range(4)]
     for k, run in enumerate(runs):
         run.periodic[:] = False

@@ -11,7 +11,7 @@ HEAT = {"light": (1.0, 3.0), "heavy": (2.0, 0.5)}  # kT_x and kT_y
 
 @pytest.fixture
 def uneven(tmp_path, rng):
-    """Return a run of two species with different kT_x and kT_y; the heavy species flows."""
+    """Return a run of two species with different kT_x and kT_y, in which the heavy one flows."""
     mass = np.repeat([1.0, 5.0], [60, 40])
     heat = np.repeat([HEAT["light"], HEAT["heavy"]], [60, 40], axis=0)
     v = rng.normal(size=(400, 100, 2)) * np.sqrt(heat / mass[:, None])

@@ -1,4 +1,4 @@
-"""Contact networks obey the balance of momentum of each disk, chains their definition."""
+"""Contact networks satisfy the momentum balance of each disk; chains satisfy their definition."""
 
 import csv
 

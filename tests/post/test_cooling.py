@@ -1,4 +1,4 @@
-"""Cooling gases: laws of Haff for hard and soft disks, and the scripts haff and cooling."""
+"""Cooling gases: Haff's law for hard and soft disks, and the scripts haff and cooling."""
 
 import csv
 
@@ -23,9 +23,9 @@ from synthetic_run import drawn, run_script, write_run, written
 
 
 def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp_path, capsys):
-    """Diffusion coefficient, pressure and equation of state are not defined.
+    """Diffusion coefficient, pressure and equation of state are undefined.
 
-    The test draws the figures of four scripts, among them the structure of a dilute gas.
+    The figures of four scripts are drawn, including the structure of a dilute gas.
     """
     rows = drawn(tmp_path, "correlations", bulk[2])
     assert "no steady state without flow: time correlations" in capsys.readouterr().err
@@ -81,7 +81,7 @@ def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, sim
 
 @pytest.mark.parametrize("law", ["power", "viscoelastic"])
 def test_soft_disks_cool_by_a_law_of_their_own(simulated, tmp_path, law):
-    """K decreases as t^(-5/3) at late times; if all speeds exceed g0, it follows Haff's law."""
+    """K decreases as t^(-5/3) at late times, and by Haff's law while all speeds exceed g0."""
     hard = hd.haff_soft(Restitution(0.7, law, 1e-9), 1.0)
     np.testing.assert_allclose(hard[2][:99], hd.haff_by_time(hard[0][:99], 0.7), rtol=1e-3)
     soft = hd.haff_soft(Restitution(0.7, law, 10.0), 1.0)
@@ -102,7 +102,7 @@ def test_soft_disks_cool_by_a_law_of_their_own(simulated, tmp_path, law):
 
 
 def test_cooling_averages_over_runs_on_one_grid(tmp_path):
-    """Relative energies are drawn against collisions, energies in input units against time."""
+    """Relative energies are plotted against collisions, energies in input units against time."""
     paths = [
         cooled(tmp_path / f"{k}.h5", 0.9, decay, points=p)
         for k, (decay, p) in enumerate([(1.0, 401), (2.0, 301)])
@@ -119,7 +119,7 @@ def test_cooling_averages_over_runs_on_one_grid(tmp_path):
 
 
 def test_a_gas_of_one_kind_cools_without_a_ratio(tmp_path, rng):
-    """The title contains the rule of the walls only if there are walls."""
+    """The title gives the rule of the walls only if there are walls."""
     for periodic in (False, True):
         more = {"names": ("all",), "periodic": (periodic, periodic)}  # disks of the name all
         path = gas(tmp_path / f"{periodic}.h5", rng, **more)
@@ -131,7 +131,7 @@ def test_a_gas_of_one_kind_cools_without_a_ratio(tmp_path, rng):
 
 @pytest.mark.parametrize("end", [25.0, None])
 def test_the_cooling_rate_is_that_of_the_homogeneous_state(rng, end):
-    """The rate is three per cent above the law with a scatter of one, and half of it later."""
+    """At first the rate is 3 % above the law with a scatter of 1, later half of it."""
     tau, true = np.linspace(0, 60, 601), 1.03 * cooling.hard_disks.haff_rate(0.9)
     tracks = []
     for factor in 1 + 0.01 * rng.normal(size=20):
@@ -148,7 +148,7 @@ def test_the_cooling_rate_is_that_of_the_homogeneous_state(rng, end):
 
 
 def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):
-    """Runs that follow the law start without rotation or with too much rotation."""
+    """Runs that follow the law start without rotation, or with too much of it."""
     law, tau = (0.9, 0.0, 0.5), np.linspace(0, 25, 251)
 
     def run(start, last=251):
@@ -168,7 +168,7 @@ def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):
 
 
 def test_the_ratio_of_temperatures_is_a_mean_over_collisions_per_disk(tmp_path, rng):
-    """In run k the ratio grows linearly with the collisions per disk, but not with time."""
+    """In run k the ratio is linear in the collisions per disk, but not in time."""
     runs, tau = [], np.linspace(0, 12, 121)
     for k in range(3):
         v = rng.normal(size=(1, 40, 2))
@@ -189,7 +189,7 @@ def test_the_ratio_of_temperatures_is_a_mean_over_collisions_per_disk(tmp_path, 
 def test_a_flow_in_a_cooling_gas_is_told_apart_from_independent_velocities(
     tmp_path, rng, count, kinds
 ):
-    """A wave of the velocity contains 0, 10 or 40 % of the energy of a mixture of unequal kT."""
+    """A velocity wave has 0, 10 or 40 % of the energy of a mixture of unequal kT."""
     mass = np.tile(np.array(kinds, float), count // 2)
     thermal = np.sqrt(np.tile([1.0, 1.8], count // 2) / mass)[:, None]
     for share in (0.0, 0.1, 0.4):
@@ -204,14 +204,14 @@ def test_a_flow_in_a_cooling_gas_is_told_apart_from_independent_velocities(
             run = written(path, x, v, periodic=(True, True), **more)
             found.append(cooling.flow_share([run]))
         mean, error = estimates.estimate([one.share for one in found])
-        fixed = 3 / count  # the fixed momentum of a few disks makes the share smaller
+        fixed = 3 / count  # for a few disks, the fixed momentum reduces the fraction
         assert 0.7 * share - fixed - 4 * error < mean < share + 4 * error
         apart = sum(not one.homogeneous for one in found)
         assert apart <= 1 if share == 0 else apart >= 12 * (share * count > 100)
 
 
 def test_a_cooling_gas_that_is_not_homogeneous_is_named(tmp_path, rng, capsys):
-    """The script cooling and the table of a sweep warn that flows contain energy."""
+    """The script cooling and the table of a sweep warn of energy in flows."""
     (tmp_path / "scan").mkdir()
     for seed, speed in enumerate((0.0, 1.5)):
         x, v = rng.uniform(size=(2, 400, 2)), rng.normal(size=(2, 400, 2))

@@ -1,4 +1,4 @@
-"""Scattering by one disk, and craters: the scripts scattering, crater and crater_scan."""
+"""Scattering of one disk, and craters: the scripts scattering, crater and crater_scan."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from synthetic_run import drawn, write_run
 
 
 def collision(path, b, ratio=1e6):
-    """Write two frames of a light disk that is scattered by a heavy disk at rest."""
+    """Write two frames of a light disk scattered by a heavy disk at rest."""
     r, v = np.array([0.1, 0.001]), np.array([1.0, 0.0])
     normal = np.array([-np.sqrt(1 - b**2), b]) if abs(b) < 1 else np.zeros(2)
     after = v - 2 * ratio / (1 + ratio) * (v @ normal) * normal
@@ -111,9 +111,9 @@ def test_a_crater_that_was_cut_short_is_marked(tmp_path, capsys, words, more):
 
 
 def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
-    """The grid has three masses, two speeds, two seeds; two runs are isolated, one of them doubled.
+    """The grid has three masses, two speeds, two seeds, and two isolated runs, one of them doubled.
 
-    Points that the box or time cut short are in no fit; the same run twice counts once.
+    Points limited by the box or by time are not fitted; a run given twice counts once.
     """
     grid = [
         impact(tmp_path / f"{m}_{v}_{s}.h5", mass=m, speed=v, seed=s, moved=m + s, walls=m // 15)
@@ -142,7 +142,7 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
     figure = ricochet.analyse("crater_scan", runs).figure()
     legends = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
     assert {"speed 2", "speed 5", "mass 5", "mass 10", "mass 15"} <= set(legends)
-    title = figure.axes[0].get_title("left") + figure.axes[0].get_title()  # whatever the style
+    title = figure.axes[0].get_title("left") + figure.axes[0].get_title()  # in any style
     assert title == "radius 5,  restitution 0.5"
     rows = drawn(tmp_path, "crater_scan", *paths)
     assert len(rows) == 6 + 6 and {row["speed"] for row in rows} == {"2.0", "5.0"}
@@ -161,7 +161,7 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
 @pytest.mark.parametrize("shared", [True, False])
 @pytest.mark.parametrize("runs", [2, 8])
 def test_exponents_hold_the_true_one_whether_points_share_beds(rng, shared, runs, samples):
-    """A bed with a large crater increases the sizes at all points that it shares."""
+    """A bed with a large crater increases the sizes at all points that share it."""
     none = statistics.Estimate(0.0, 0.0)
 
     def point(mass, number, beds):

@@ -1,4 +1,4 @@
-"""Every example in the docstring of a public function is executed."""
+"""Execute every example in the docstring of a public function."""
 
 import doctest
 import sys
@@ -86,13 +86,13 @@ def names(request, tmp_path_factory):
 
 @pytest.mark.parametrize("module", ["ricochet", *(f"ricochet.{name}" for name in MODULES)])
 def test_the_examples_of_a_module_work(module, names):
-    """The examples run in a namespace with NumPy, the names of the module and a few small runs."""
+    """The namespace has NumPy, the names of the module, and a few small runs."""
     loaded = import_module(module)
     finder, runner = doctest.DocTestFinder(), doctest.DocTestRunner(optionflags=FLAGS)
     told: list[str] = []
     globs = {**vars(loaded), **names}
     found = finder.find(loaded, globs=globs)
-    if module == "ricochet":  # its functions and classes are defined in other modules
+    if module == "ricochet":  # defined in other modules
         for name in loaded.__all__:
             own = getattr(loaded, name)
             found += finder.find(own, name, globs=globs)

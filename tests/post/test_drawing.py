@@ -1,4 +1,4 @@
-"""Functions that figures of several scripts share: frames, images, paths, captions and formats."""
+"""Functions shared by the figures of several scripts: frames, images, paths, captions, formats."""
 
 import importlib.util
 
@@ -106,13 +106,13 @@ def test_other_formats_are_written_too(tmp_path, rng):
 
 
 def test_figures_of_the_pages_keep_the_colours_of_their_lines(tmp_path):
-    """Thin lines have few pixels; most of the colours could go to shades of other areas."""
+    """Thin lines have few pixels, and most colours could go to shades of other areas."""
     source = importlib.util.spec_from_file_location("page_figures", ROOT / "docs/page_figures.py")
     pages = importlib.util.module_from_spec(source)
     source.loader.exec_module(pages)
     plt.style.use(STYLE)
     figure, axes = plt.subplots(figsize=(8, 8))
-    axes.set_ylim(-3, 12)  # the lines lie above the part of the figure that is cut off
+    axes.set_ylim(-3, 12)  # the lines are above the part of the figure that is cut off
     for k, colour in enumerate(COLOURS[:6]):
         axes.plot([0, 1], [k, k], lw=2, color=colour)
         axes.fill_between([0, 1], k + 0.1, k + 0.9, color=colour, alpha=0.25)

@@ -110,7 +110,7 @@ def test_single_points_are_seen_and_titles_lie_over_no_words_of_a_wall(simulated
 
 @samples(200, 2000)
 def test_an_even_gas_has_no_fuller_half(rng, samples):
-    """This also holds with correlations; a lasting majority in one half is detected."""
+    """This holds for correlated frames, too; a lasting majority in one half is detected."""
     noise = lfilter([1], [1, -0.9], rng.normal(scale=0.02, size=(samples, 300)))
     even = np.array([fuller(0.5 + one).mean() for one in noise])
     assert even.mean() == pytest.approx(0.5, abs=4 * even.std() / np.sqrt(samples))

@@ -21,7 +21,7 @@ SHEARED = """&box upper = 20, 10 boundary = 'wall', 'periodic' /
 
 
 def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
-    """Two disks in the left half have equal velocities; two disks in the right half separate."""
+    """Two disks in the left half have equal velocities; two in the right half separate."""
     position = np.array([[[0.1, 0.2], [0.2, 0.8], [0.7, 0.2], [0.8, 0.8]]] * 8)
     velocity = np.array([[[1.0, 2.0], [1.0, 2.0], [3.0, 2.0], [-1.0, 2.0]]] * 8)
     run = written(tmp_path / "a.h5", position, velocity, periodic=PERIODIC, radius=0.1)
@@ -40,7 +40,7 @@ def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
     ("cells", "shear"), [((16, 12), 0.0), ((16, 12), 0.5), ((4, 1), 0.0), ((1, 4), 0.5)]
 )
 def test_fields_of_few_values_have_no_bias_and_their_errors_hold(tmp_path, rng, cells, shear):
-    """Random velocities and positions between walls: kT = 2 and a uniform accessible density.
+    """Random velocities and positions between walls, with kT = 2 and uniform accessible density.
 
     The mean flow does not contribute to the temperature, even in cells with few disks.
     """
@@ -76,7 +76,7 @@ def test_errors_of_a_flow_of_bounded_displacements_are_its_scatter(tmp_path, rng
 
 
 def test_cells_in_which_few_disks_were_have_no_error_of_nothing(tmp_path, rng):
-    """One disk in each of two blocks determines the flow only; an empty cell has no error of 0."""
+    """One disk in each of two blocks determines only the flow; an empty cell has no error of 0."""
     place = np.full((32, 4, 2), 0.1)
     place[[18, 30], 3, 0] = 0.5
     run = written(tmp_path / "a.h5", place, rng.normal(size=place.shape), periodic=PERIODIC)
@@ -98,7 +98,7 @@ def test_a_map_of_a_round_container_is_drawn_in_it(tmp_path, rng):
 
 
 def test_the_area_that_centres_can_reach(tmp_path):
-    """Strips of one radius at walls and around circles and straight walls are not accessible."""
+    """Strips one radius wide along walls, and around circles and straight walls, are excluded."""
     one = np.full((2, 1, 2), 0.5)
     parts = {"radius": 0.1, "edges": (4, 2), "obstacles": [((1.0, 1.0), 0.4, 0)]}
     parts |= {"walls": [((3.0, 1.0), (3.4, 1.0))], "periodic": (True, False)}
@@ -129,7 +129,7 @@ GASES = {  # input, cells and the known kT
     + [pytest.param(name, 30, marks=pytest.mark.check) for name in GASES],
 )
 def test_fields_of_gases_have_the_temperature_that_is_known(simulated, gas, seeds):
-    """The errors of a run contain the mean of many seeds with the stated probability."""
+    """The error bars of a run contain the mean of many seeds with the stated probability."""
     text, cells, truth = GASES[gas]
     output = "&output frames_every_time = 4 observables_every_time = 4 /"
     system = ROOT / "input" / text if text.endswith("nml") else f"{text}\n{output}\n"
@@ -149,7 +149,7 @@ def test_fields_of_gases_have_the_temperature_that_is_known(simulated, gas, seed
 
 
 def test_the_law_carries_the_fluxes_and_is_a_gas_at_rest_without(simulated):
-    """The gradients times viscosity and conductivity are equal to the fluxes at the walls."""
+    """Gradients times viscosity and conductivity equal the fluxes at the walls."""
     run, eta = simulated(SHEARED.format(speed=0)), 0.3
     flux = fields.Fluxes(4 * eta / np.pi * 2 * hd.henderson(eta), 0.0, 0.0)
     law = fields.expected(run, 0, np.linspace(1, 19, 7), flux, (0.5, 2.0))

@@ -1,4 +1,4 @@
-"""Parts of figures besides the measured curves: bands of single runs, panels, explanations."""
+"""Parts of figures other than the measured curves: bands of single runs, panels, explanations."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def mixture(path, energies, tau=20.0, cooled=0.0):
 
 @pytest.mark.parametrize("kept", [True, False])
 def test_the_expected_scatter_of_one_run_is_that_of_exponential_energies(tmp_path, rng, kept):
-    """The sum is fixed if the energy is conserved; 4000 gases of 3 to 60 disks are compared."""
+    """4000 gases of 3 to 60 disks are compared; a conserved energy has a fixed sum."""
     count = int(rng.integers(3, 60))
     draws = rng.exponential(size=(4000, count))
     if kept:
@@ -76,7 +76,7 @@ def test_the_expected_scatter_of_one_run_is_that_of_exponential_energies(tmp_pat
 
 
 def test_cooling_has_a_linear_panel_for_each_restitution(tmp_path, rng, figures):
-    """Each panel shows three means in units of the input with the band of single runs."""
+    """Each panel shows three means in units of the input, with the band of single runs."""
     paths = []
     for k, cooled in enumerate((0.0, 0.1)):
         draws = 3 * rng.exponential(size=(5, 30))
@@ -103,7 +103,7 @@ def test_cooling_has_a_linear_panel_for_each_restitution(tmp_path, rng, figures)
 
 
 def test_the_table_of_cooling_has_both_values_after_the_same_number_of_collisions(tmp_path, rng):
-    """The energies of both runs fall by 10 % in time, the second in twice as many collisions."""
+    """The energies of both runs fall by 10 % over time, the second in twice as many collisions."""
     runs = []
     for k, tau in enumerate((20.0, 40.0)):
         draws = rng.exponential(size=(5, 30))
@@ -120,7 +120,7 @@ def test_the_table_of_cooling_has_both_values_after_the_same_number_of_collision
 
 
 def test_the_total_energy_has_a_linear_panel_for_each_time_step(tmp_path, rng, figures):
-    """A panel shows the first run of each method, and a note explains changes by rounding."""
+    """A panel shows the first run by each method; a note explains changes due to rounding."""
     paths, totals, time = [], [], np.linspace(0, 8, 41)
     for k, dt in enumerate((0.0, 0.1, 0.2, 0.2)):
         total = 7.0 + 1e-15 * rng.normal(size=41)
@@ -204,7 +204,7 @@ def test_the_reason_of_the_start_names_what_drifts(tmp_path, rng):
 
 
 def test_a_relaxed_gas_loses_no_time_and_a_drifting_gas_does(tmp_path, rng):
-    """The observables fluctuate slowly, as under gravity; in some runs one of them drifts."""
+    """Observables fluctuate slowly, as under gravity; in some of the runs one of them drifts."""
     time, v, lost = np.arange(1001.0), rng.normal(size=(2, 4, 2)), []
     for k in range(24):
         noise = lfilter([1], [1, -0.8], rng.normal(size=(4, 1001)))
@@ -235,7 +235,7 @@ def maxwellian(path, rng, mass=2.0, kt=3.0, count=400, frames=41):
 
 
 def test_speeds_are_drawn_in_units_of_the_input_on_request(tmp_path, rng, figures, capsys):
-    """Maxwell's curve has its maximum at sqrt(kT / m); curve and histogram have the area 1."""
+    """The Maxwell curve has its maximum at sqrt(kT / m); curve and histogram have the area 1."""
     path, out = maxwellian(tmp_path / "gas.h5", rng), tmp_path / "a.png"
     assert run_script("speeds", path, "-o", out, "--unscaled", "--units", "length=m,time=s") == 0
     for axes in figures[0].axes[:3]:
@@ -251,7 +251,7 @@ def test_speeds_are_drawn_in_units_of_the_input_on_request(tmp_path, rng, figure
 
 
 def test_the_coefficient_of_speeds_is_explained_beside_its_band(tmp_path, rng, figures):
-    """The legend shows the colours of the band and of the curve, for each number of disks."""
+    """The legend shows the colours of band and curve for each number of disks."""
     path, small = maxwellian(tmp_path / "gas.h5", rng), maxwellian(tmp_path / "b.h5", rng, count=50)
     assert run_script("speeds", path, "-o", tmp_path / "a.png") == 0
     assert run_script("speeds", path, small, "-o", tmp_path / "a.png") == 0
@@ -360,7 +360,7 @@ def test_the_title_of_paths_says_when_lines_are_not_the_exact_path(tmp_path, fig
 
 
 def test_panels_contain_the_number_of_events_before_the_frame(tmp_path, figures, simulated):
-    """The numbers agree with the event log, also for the last frame, which follows earlier."""
+    """The numbers agree with the event log, even for the last frame, which follows earlier."""
     gas = "&species count = 20 radius = 0.02 speed = 1 / &stop events = 57 / "
     gas += "&output event_log = .true. frames_every_{} = {} /"
     for name, every in (("events", 20), ("collisions", 10)):
@@ -381,7 +381,7 @@ def test_panels_contain_the_number_of_events_before_the_frame(tmp_path, figures,
 
 
 def test_equal_speeds_have_a_colour_of_the_middle_of_the_scale(simulated, tmp_path, figures):
-    """No end of the colour bar is an arrow, as no speed is beyond the scale."""
+    """The colour bar has no arrow at its ends, because no speed exceeds the scale."""
     run = simulated("&species count = 9 radius = 0.05 speed = 3 /&stop events = 0 time = 0 /")
     words = ("--frames", "0", "--colour", "speed", "-o", tmp_path / "a.png")
     assert run_script("snapshot", run.path, *words) == 0
@@ -405,7 +405,7 @@ def test_outlines_are_inside_the_disks(tmp_path, rng):
 
 
 def test_spins_have_a_colour(tmp_path, rng, figures, capsys, simulated):
-    """The scale has 0 in its middle; disks that cannot rotate have no spin to draw."""
+    """The scale has 0 at its centre; disks that cannot rotate have no spin."""
     rough = "&contact tangential_restitution = 0 /"
     run = simulated(f"&species count = 9 radius = 0.05 temperature = 1 /{rough}&stop time = 1 /")
     assert run_script("snapshot", run.path, "--colour", "spin", "-o", tmp_path / "a.png") == 0
@@ -453,7 +453,7 @@ def test_fields_of_a_run_that_is_too_short_say_that_they_have_no_errors(tmp_path
 
 @samples(30, 300)
 def test_the_collisions_that_one_pair_of_runs_misses_have_an_error(rng, samples):
-    """The error bar contains the true value in two of three pairs of runs with correlated rates."""
+    """Error bars contain the true value in two of three pairs of runs with correlated rates."""
     held, true = [], 0.1
     for _ in range(samples):
         noise = rng.normal(size=(2, 420))

@@ -18,7 +18,7 @@ from synthetic_run import drawn
 @samples(40, 300)
 @pytest.mark.parametrize("reach", [gravity.SPEED_RANGE, gravity.HEIGHT_RANGE])
 def test_errors_of_slopes_are_their_scatter_although_kt_is_measured(rng, reach, samples):
-    """The values have exponential distributions whose kT changes from block to block."""
+    """The values have exponential distributions, with kT varying from block to block."""
     found = []
     for _ in range(samples):
         kt = np.repeat(rng.gamma(400, 1 / 400, gravity.BLOCKS), 60)[:, None]
@@ -36,7 +36,7 @@ def test_errors_of_slopes_are_their_scatter_although_kt_is_measured(rng, reach, 
 
 
 def test_slopes_of_heights_are_those_of_the_law_under_a_lid(rng):
-    """The lid is between 1.4 and 8 kT / m g above the floor; the fit ends there."""
+    """The fit ends at the lid, which is between 1.4 and 8 kT / m g above the floor."""
     pulls = []
     for lid in rng.uniform(1.4, 8, 60):
         heights = -np.log1p(-rng.uniform(size=(300, 30)) * -np.expm1(-lid))
@@ -49,7 +49,7 @@ def test_slopes_of_heights_are_those_of_the_law_under_a_lid(rng):
 
 
 def test_a_low_lid_is_named_with_the_end_of_the_fit(tmp_path, rng, capsys):
-    """The lid at 16 is at 2.8 kT / m g for the light disks and at 5.6 for the heavy ones."""
+    """The lid at height 16 is at 2.8 kT / m g for the light disks and at 5.6 for the heavy ones."""
     path = falling(tmp_path / "run.h5", rng, temperature=1.4)
     rows = drawn(tmp_path, "gravity", path)
     assert [float(row["height_fit_to"]) for row in rows] == pytest.approx([2.8, 5.0], rel=0.05)
@@ -106,7 +106,7 @@ def test_thermalisation_time_ignores_a_passing_agreement():
 
 @samples(20, 200)
 def test_one_run_of_many_disks_has_a_thermalisation_time_with_an_error(rng, samples):
-    """Its error follows from fluctuations in equilibrium and has a coverage of 68 %."""
+    """Its error is based on fluctuations in equilibrium and has a coverage of 68 %."""
     time, found = np.arange(0, 40, 0.25) + 0.25, []
     kinds = [SimpleNamespace(mass=mass) for mass in (1.0, 2.0)]
     for _ in range(samples):
@@ -126,7 +126,7 @@ def test_one_run_of_many_disks_has_a_thermalisation_time_with_an_error(rng, samp
 
 
 def thermalisation_time(time, light, heavy):
-    """Return the time from which mean energies (runs, T) of both species differ by at most 10 %."""
+    """Return the time after which mean energies (runs, T) of the species differ by at most 10 %."""
 
     def crossing(both):
         return equipartition.entry(time, np.abs(both[1] / both[0] - 1))
@@ -136,7 +136,7 @@ def thermalisation_time(time, light, heavy):
 
 @samples(30, 300)
 def test_the_error_of_the_thermalisation_time_is_the_scatter_of_groups(rng, samples):
-    """The energy difference falls below 10 % at a known time; the noise is that of 20 runs."""
+    """The energy difference falls below 10 % at a known time, with the noise of 20 runs."""
     time = np.arange(0.25, 12, 0.5)
     difference, truth = np.exp(-time / 3), 3 * np.log(10)
 
@@ -156,7 +156,7 @@ def test_the_error_of_the_thermalisation_time_is_the_scatter_of_groups(rng, samp
 
 
 def test_the_error_of_the_thermalisation_time_is_at_most_the_size_of_a_jump(rng):
-    """Noise lets a curve whose maxima are 2.5 apart cross the limit a period early or late."""
+    """Owing to noise, a curve with maxima 2.5 apart crosses the limit a period early or late."""
     time = np.arange(0.25, 12, 0.5)
     difference = np.exp(-time / 3) * (1 + 0.6 * np.cos(2 * np.pi * time / 2.5))
 
@@ -169,7 +169,7 @@ def test_the_error_of_the_thermalisation_time_is_at_most_the_size_of_a_jump(rng)
 
 
 def test_one_run_does_not_say_that_energies_agree(tmp_path, rng, capsys):
-    """In equilibrium the energies of 30 disks pass through agreement again and again."""
+    """In equilibrium the energies of 30 disks agree by chance again and again."""
     path = falling(tmp_path / "run.h5", rng)
     (row,) = drawn(tmp_path, "equipartition", path)
     assert row["T_therm"] == "nan" and "use more runs" in capsys.readouterr().err

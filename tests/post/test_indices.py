@@ -1,4 +1,4 @@
-"""All functions accept the same kinds of index: number, slice, list, tuple or array."""
+"""All functions accept the same kinds of index: integer, slice, list, tuple or array."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from ricochet import structure
 
 FRAMES = 6
 EDGES = np.linspace(0.5, 3, 6)
-#: Functions of a run and an index with a row of the result for each frame.
+#: Functions of a run and an index that return a row for each frame.
 BY_FRAME = {
     "speed": lambda run, index: run.speed(index),
     "kinetic_energy": lambda run, index: run.kinetic_energy(index),
@@ -17,7 +17,7 @@ BY_FRAME = {
     "bond_order": structure.bond_order,
     "largest_cluster": lambda run, index: structure.largest_cluster(run, index, 0.05),
 }
-#: Functions of a run and an index with a mean over the frames as the result.
+#: Functions of a run and an index that return a mean over the frames.
 MEANS = {
     "pair_correlation": lambda run, index: structure.pair_correlation(run, index, EDGES),
     "structure_factor": lambda run, index: structure.structure_factor(run, index, 10 * EDGES),
@@ -36,7 +36,7 @@ def run(tmp_path, rng):
 
 
 def kinds_of(numbers: list[int]) -> list:
-    """Return the same frames as a list, tuple and array and, for equal steps, range and slice."""
+    """Return the same frames as list, tuple and array and, if equally spaced, range and slice."""
     kinds = [numbers, tuple(numbers), np.array(numbers, dtype=int)]
     steps = np.unique(np.diff(numbers))
     if len(numbers) > 1 and len(steps) == 1 and steps[0] > 0 and numbers[0] >= 0:
@@ -48,7 +48,7 @@ def kinds_of(numbers: list[int]) -> list:
 @pytest.mark.parametrize("numbers", [[2], [-1], [1, 2, 3], [0, 2, 4], [3, 0, 5], [-1, 2], []])
 @pytest.mark.parametrize("name", BY_FRAME)
 def test_each_kind_of_index_chooses_the_same_frames(run, name, numbers):
-    """Each row is equal to the result for a single frame."""
+    """Each row equals the result for a single frame."""
     rows = [BY_FRAME[name](run, number) for number in numbers]
     for kind in kinds_of(numbers):
         found = BY_FRAME[name](run, kind)

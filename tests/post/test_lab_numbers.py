@@ -20,7 +20,7 @@ from synthetic_run import ROOT
 
 
 def test_the_pressure_beside_a_moving_side_is_that_of_the_area_of_each_moment():
-    """Therefore the pressure of the whole time is the mean of the pressures of its parts."""
+    """The pressure over the whole time is therefore the mean of the pressures of its parts."""
     samples, count = [], 200
     with Simulation(ROOT / "input/constant_pressure.nml") as run:
         for time in np.linspace(5, 20, 301):
@@ -32,7 +32,7 @@ def test_the_pressure_beside_a_moving_side_is_that_of_the_area_of_each_moment():
     assert pressure_between(np.array(samples).T).mean == pytest.approx(np.mean(means))
 
 
-THEORIES = {  # systems in equilibrium, and the number of their theoretical values
+THEORIES = {  # systems in equilibrium, with the number of their theoretical values
     "a gas between walls": ("&species count = 200 radius = 0.01 speed = 1 /", 4),
     "a mixture between walls": (
         "&species name = 'a' count = 100 radius = 0.006 speed = 1 /\n"
@@ -71,7 +71,7 @@ THEORIES = {  # systems in equilibrium, and the number of their theoretical valu
 
 @pytest.mark.parametrize("case", THEORIES)
 def test_theory_is_what_is_measured_in_equilibrium(case):
-    """Theoretical values are absent where no theory applies."""
+    """Where no theory applies, there are no theoretical values."""
     text, known = THEORIES[case]
     samples = []
     with Simulation(text) as simulation:
@@ -147,7 +147,7 @@ SCANS = {  # for a gas: changes, measured quantity, values, and expected proport
 
 @pytest.mark.parametrize("case", SCANS)
 def test_a_scan_gives_means_and_rates_whatever_the_time_it_takes(address, case):
-    """All rates of a run are proportional to its speeds; a busy machine ends no sample early."""
+    """All rates in a run are proportional to its speeds; a busy machine ends no sample early."""
     settings, of, values, powers = SCANS[case]
 
     async def visit():

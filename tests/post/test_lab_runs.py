@@ -17,7 +17,7 @@ from sampling import STATISTICS
 from synthetic_run import ROOT
 
 INPUTS = sorted(json.loads((ROOT / "input/chooser.json").read_text()))
-#: Every fourth input is tested in `make test`, and all inputs are tested in `.ci/run`.
+#: `make test` uses every fourth input, `.ci/run` all of them.
 OF_EACH = [pytest.param(one, marks=STATISTICS if k % 4 else ()) for k, one in enumerate(INPUTS)]
 
 
@@ -154,7 +154,7 @@ def test_few_disks_tell_what_comes_and_one_event_is_a_step(address):
     asyncio.run(visit())
 
 
-#: Settings that are refused, the variable beside which the message is shown, and words of it.
+#: Refused settings, the variable beside which the message is shown, and words in it.
 WRONG = [
     ({"species.gas.radius": "0.1"}, "species.gas.radius", "closest packing"),
     ({"contact.restitution": "2"}, "contact.restitution", "from 0 to 1"),

@@ -41,7 +41,7 @@ def test_no_file_is_read_by_another_door(address):
     asyncio.run(visit())
 
 
-#: A worker that sends one message as soon as it starts.
+#: Worker that sends a single message when it starts.
 SCENE = """printf 't\\000\\000\\000\\017{"is": "scene"}'; exec cat"""
 
 
@@ -105,7 +105,7 @@ def test_other_sites_are_refused_before_they_cost_anything(address):
 
 
 def test_a_crowd_with_few_files_gets_answers(program, tmp_path):
-    """Many connections send one byte or nothing while a run continues."""
+    """Many connections send a byte or nothing while a run continues."""
 
     def few():
         resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
@@ -133,13 +133,13 @@ def test_a_crowd_with_few_files_gets_answers(program, tmp_path):
 
 
 def children(pid):
-    """Return the numbers of the child processes of a process."""
+    """Return the ids of the child processes of a process."""
     tasks = Path(f"/proc/{pid}/task").glob("*/children")
     return [int(child) for task in tasks for child in task.read_text().split()]
 
 
 def alive(pids):
-    """Return the processes in a list that are still running."""
+    """Return those processes in a list that are still running."""
     found = []
     for pid in pids:
         try:
@@ -165,7 +165,7 @@ def alive(pids):
     ],
 )
 def test_nothing_is_left_behind(program, tmp_path, at, signs):
-    """All processes end, also while disks are placed and while files are unfinished."""
+    """All processes end, even while disks are being placed or files are unfinished."""
     hard = {"species.gas.packing_fraction": "0.545", "species.gas.radius": "", "run.seed": "7"}
 
     async def act(process, address):

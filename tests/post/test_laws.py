@@ -1,4 +1,4 @@
-"""Theoretical results in post/, compared with series, equations and samples."""
+"""Theoretical results of the package, compared with series, equations and samples."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_poin
         assert float(hd.simulated(eta)) == pytest.approx(series, rel=2e-5)
     np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), hd.FLUID[:, 1])
     np.testing.assert_allclose(hd.simulated(hd.FREEZING[:, 0]), hd.FREEZING[:, 1])
-    dense = np.linspace(0.6, 0.698, 99)  # one curve up to freezing, with a kink at its start
+    dense = np.linspace(0.6, 0.698, 99)  # one curve up to freezing, with a kink where it starts
     slope = np.gradient(dense * hd.simulated(dense), dense)
     assert np.all(slope > 0) and np.abs(np.diff(slope)).max() < 0.1 * slope.max()
     assert np.isnan(hd.published(0.69, 1000, True))
@@ -62,7 +62,7 @@ def test_rates_of_a_mixture_of_equals_are_those_of_one_gas():
 
 
 def test_the_pressure_of_many_sizes_is_that_of_their_contacts():
-    """Z = 1 + pi / 2 n sum x_i x_j s_ij^2 chi_ij, and the limit of equal disks is correct."""
+    """Z = 1 + pi / 2 n sum x_i x_j s_ij^2 chi_ij, and equal disks are the correct limit."""
     s, n = np.array([0.01, 0.02, 0.04]), np.array([300, 200, 50])
     eta, pair = np.pi / 4 * n @ s**2, (s[:, None] + s) / 2
     chi = mixtures.contact_values(hd.simulated(eta), n, s)

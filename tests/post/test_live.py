@@ -27,7 +27,7 @@ import player; script.launch(player.main)"""
 
 @pytest.fixture
 def live(started, tmp_path):
-    """Yield a suspended run, the player that shows it, and the player's address."""
+    """Yield a suspended run, the player that shows it, and the address of the player."""
     write_input(tmp_path, LONG)
     run = started("gas.nml", "-o", "gas.h5")
     part = tmp_path / "gas.h5.part"
@@ -48,7 +48,7 @@ def opened(browser, address):
 
 
 def test_the_film_keeps_up_with_the_run_until_one_goes_elsewhere(live, browser):
-    """This takes 5 to 10 s, because the run is made into a film again for each request."""
+    """This takes 5 to 10 s, because each request converts the run to a film again."""
     run, _, address = live
     assert address.startswith("http://127.0.0.1:")
     opened(browser, address)
@@ -90,7 +90,7 @@ def test_the_show_stops_when_asked_and_the_run_goes_on(live, sign):
 @pytest.mark.parametrize("how", ["has ended", "has stopped", "was killed or has crashed"])
 @pytest.mark.parametrize("seen", [True, False])
 def test_the_show_ends_with_the_run_and_says_so(live, browser, tmp_path, capsys, how, seen):
-    """A page keeps the film; a suspended run counts as running, a killed run has no lock."""
+    """A page keeps the film. A suspended run counts as running; a killed run has no lock."""
     run, show, address = live
     part, left = tmp_path / "gas.h5.part", tmp_path / "gas.h5"
     if seen:
@@ -135,7 +135,7 @@ def test_requests_under_another_name_are_refused(live):
         with socket.create_connection(("127.0.0.1", server), timeout=PATIENCE) as connection:
             connection.sendall(f"{line}\r\n{head}Connection: close\r\n\r\n".encode())
             answer = connection.makefile("rb").read()
-        return int(answer[9:12] or 0)  # 0 without an answer
+        return int(answer[9:12] or 0)  # 0 if there is no answer
 
     own, other = "127.0.0.1:PORT", "evil.example"
     assert status_of("GET / HTTP/1.1", "localhost:PORT") == 200

@@ -30,14 +30,14 @@ def test_a_short_name_is_the_module_itself(name):
 
 
 def test_no_module_has_the_name_of_another_or_of_a_function():
-    """Otherwise a short name would be ambiguous."""
+    """A short name would otherwise be ambiguous."""
     paths = [path for path in INIT.parent.glob("*/*.py") if path.stem != "__init__"]
     assert sorted(path.stem for path in paths) == sorted(modules())
     assert not modules().keys() & {*ricochet.__all__}
 
 
 def test_type_checkers_see_the_modules_that_are_there():
-    """Type checkers do not execute `__getattr__`; they read the imports in `__init__.py`."""
+    """Type checkers do not execute `__getattr__` but read the imports in `__init__.py`."""
     found = {
         name.asname: f"ricochet.{node.module}.{name.name}"
         for node in ast.walk(ast.parse(INIT.read_text()))
@@ -56,7 +56,7 @@ def test_a_name_that_is_not_there_is_an_error():
 
 
 def test_the_version_is_the_same_everywhere(program):
-    """The versions compared are those of the package, of the program and of the citation."""
+    """The versions of the package, the program and the citation are compared."""
     root = INIT.parents[2]
     version = ricochet.__version__
     assert f"ricochet {version}" in ran(program, "--version").stdout
@@ -67,7 +67,7 @@ def test_the_version_is_the_same_everywhere(program):
 
 
 def test_inputs_are_found_by_name(tmp_path, monkeypatch):
-    """The working folder does not matter; unknown names are answered with a similar one."""
+    """The working folder does not matter; for an unknown name a similar one is suggested."""
     monkeypatch.chdir(tmp_path)
     assert ricochet.example("gas") == ricochet.example("gas.nml")
     with ricochet.Simulation(ricochet.example("gas")) as gas:
@@ -86,7 +86,7 @@ def test_the_package_loads_no_more_than_its_names_need():
 
 
 def test_importing_a_script_leaves_the_figures_of_a_notebook_alone():
-    """Figures drawn after the import of any script keep their backend and style."""
+    """Figures drawn after importing any script keep their backend and style."""
     code = f"""if True:
         import pkgutil, sys
         import matplotlib

@@ -1,4 +1,4 @@
-"""The page of the laboratory: kept runs beside the next run, in equal boxes and at equal times."""
+"""Page of the laboratory: kept runs beside the next run, in equal boxes and at equal times."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from whole_runs import wait_for
 
 
 def test_kept_runs_stand_beside_the_next_in_equal_boxes_and_plots(opened):
-    """This takes 5 s, because several runs move and are drawn at the same time."""
+    """This takes 5 s, because several runs move and are drawn simultaneously."""
     opened.press("c")
     moving(opened, 1)
     slide(opened, 0, 0.7)
@@ -37,9 +37,9 @@ TIMES = "return films().map(one => one.inside().moment.shown)"
 
 
 def test_compared_runs_show_one_time_and_go_on_alone(opened):
-    """This holds while they play, at each step, and when a paused film goes to another time.
+    """This holds while they play, at each step, and when a paused film moves to another time.
 
-    This takes 5 to 10 s, because three runs move and are drawn at the same time.
+    It takes 5 to 10 s, because three runs move and are drawn simultaneously.
     """
     wait_for(lambda: inside(opened, "moment.time") > 0.1)
     for kept in (1, 2):
@@ -53,7 +53,7 @@ def test_compared_runs_show_one_time_and_go_on_alone(opened):
         times = opened.run(TIMES)
         assert len(times) == 3 and min(times) == max(times)
         seen.add(times[0])
-    wait_for(lambda: opened.run(TIMES)[0] > stored)  # then all films have equal frames
+    wait_for(lambda: opened.run(TIMES)[0] > stored)  # then all films have the same frames
     opened.press("p")
     opened.until("return films().every(one => !one.inside().state.playing)")
     for key in ("\ue012", "\ue011", "\ue014", "\ue010", "\ue014", "n", "n", "\ue012"):
@@ -70,8 +70,8 @@ def test_compared_runs_show_one_time_and_go_on_alone(opened):
     assert len(opened.run(TIMES)) == 1
 
 
-#: Scripts that keep a run and change the next run while the frame of the next run loads.
-#: Each script comes with the settings and the number of the run that starts in the end.
+#: Scripts that keep a run and change the next run while its frame loads, each with the settings and
+#: the number of the run that finally starts.
 WHILE_LOADING = {
     "a possible value": ("keep(); set(key, '2');", {"species.gas.speed": "2"}, 3),
     "an impossible value": ("keep(); busy -= PLACING; set(key, '-1');", {}, 3),
@@ -85,7 +85,7 @@ WHILE_LOADING = {
 
 @pytest.mark.parametrize("case", WHILE_LOADING)
 def test_a_run_beside_a_kept_run_starts_whatever_is_changed_meanwhile(opened, case):
-    """Each request starts one run; the last run has the newest possible values, and moves."""
+    """Each request starts one run; the last run has the latest possible values, and moves."""
     script, settings, number = WHILE_LOADING[case]
     opened.run(f"const key = 'species.gas.speed'; {script}")
     opened.until("return !busy && !again && current().run === state.runs")
@@ -107,11 +107,11 @@ def test_a_run_that_waits_for_the_page_goes_on_beside_another_run(opened):
 
 
 def test_compared_runs_replay_the_times_that_all_of_them_have(opened):
-    """A film that lacks frames of another film never shows an earlier time than the other film."""
+    """A film that lacks frames of another film never shows an earlier time than it."""
     opened.press("c")
     moving(opened, 1)
     wait_for(lambda: inside(opened, "past.length") > 60)
-    # Every second frame of the second run is removed, as when a film needs too much memory.
+    # Every second frame of the second run is removed, as if a film needed too much memory.
     thin = """const { past } = filmOf(current()).inside();
         for (let k = past.length - 2; k > 0; k -= 2) past.splice(k, 1);
         keep();
@@ -137,7 +137,7 @@ LESSON = {
 def test_a_value_typed_beside_a_kept_run_starts_both_from_their_start(opened, name):
     """Shortcuts act after Enter, and no worker is asked for the time of the previous run.
 
-    This takes 5 to 10 s, because three runs move and are drawn at the same time.
+    This takes 5 to 10 s, because three runs move and are drawn simultaneously.
     """
     before = opened.run("return current().run")
     opened.run("choose(arguments[0])", name)
@@ -203,7 +203,7 @@ RECORDED = """const film = filmOf(current()), { axes, drawMaxwell } = film;
 
 @pytest.mark.parametrize("speed", [0.5, 2])
 def test_the_histogram_has_room_and_a_curve_for_each_compared_run(opened, speed):
-    """The maximum of Maxwell's distribution of speeds is at most e^(-1/2) sqrt(m/E)."""
+    """The maximum of the Maxwell distribution of speeds is at most e^(-1/2) sqrt(m/E)."""
     opened.press("c")
     moving(opened, 1)
     opened.run(f"set('species.gas.speed', '{speed}'); {RECORDED}")
@@ -231,7 +231,7 @@ def test_another_input_removes_the_kept_runs_and_the_same_input_keeps_them(opene
 
 
 def test_a_scan_beside_a_kept_run_is_seen_and_moves_nothing(opened):
-    """The figure is in the form, in the visible part of the window, and covers no other element."""
+    """The figure is in the visible part of the form and covers no other element."""
     opened.press("c")
     moving(opened, 1)
     begun = "return films()[1].document.getElementById('clock').textContent.startsWith('t = 0 ')"
@@ -266,7 +266,7 @@ AT_HISTOGRAM = """const film = filmOf(current()), frame = current().frame;
 
 
 def test_compared_pictures_are_scrolled_together_on_a_telephone(opened):
-    """No picture covers a plot, and the buttons to both ends of the film are there."""
+    """No picture covers a plot, and the buttons for both ends of the film are there."""
     opened.press("c")
     moving(opened, 1)
     opened.press("p")

@@ -1,4 +1,4 @@
-"""The page of the laboratory: sliders, texts, keys, mouse, downloads and addresses."""
+"""Page of the laboratory: sliders, texts, keys, mouse, downloads and addresses."""
 
 import itertools
 import os
@@ -17,7 +17,7 @@ from whole_runs import wait_for
 
 
 def test_changes_that_a_run_refuses_start_one_run_that_moves(opened):
-    """After a collapse, messages about the old run do not stop the new run."""
+    """After a collapse, messages about the old run do not stop the new one."""
     before = opened.run("return current().run")
     opened.run("""const one = filmOf(current()), settings = { 'species.gas.count': '5' };
         one.inside().stream.ended = true;
@@ -68,7 +68,7 @@ def test_a_value_that_cannot_be_waits_alone(opened):
     assert opened.run("return document.querySelector('.wrong')") is None
 
 
-#: Texts typed beside sliders of the input gas: number, variable, an allowed value.
+#: Texts typed beside sliders of the input gas: index, variable, an allowed value.
 TYPED = [
     (0, "species.gas.speed", lambda rng: rng.uniform(0.1, 9)),
     (1, "species.gas.count", lambda rng: rng.randint(2, 900)),
@@ -79,7 +79,7 @@ TYPED = [
 
 
 def some_text(rng, value):
-    """Return a random text that is a number or similar to a number."""
+    """Return a random text that is, or resembles, a number."""
     forms = "{}", "{:.3}", "{:.2e}", " {:.9f}", "{:.12}!"
     text = str(value) if isinstance(value, int) else rng.choice(forms).format(value)
     text = rng.choice([text, text.replace("e", "D"), text.replace(".", ",")])
@@ -91,7 +91,7 @@ def some_text(rng, value):
 
 
 def test_a_text_at_a_slider_is_the_value_that_runs_or_waits_with_one_message(opened):
-    """The program decides if the text is valid; nothing else changes.
+    """The program decides whether the text is valid; nothing else changes.
 
     THOROUGH tests more texts.
     """
@@ -123,7 +123,7 @@ def test_a_text_at_a_slider_is_the_value_that_runs_or_waits_with_one_message(ope
         assert key in opened.run("return Object.keys(state.waiting)") or fine, text
         assert fine or before == opened.run("return [current().run, current().changes.length]")
         opened.run("window.kept = ''")
-        # The answer to a request during which the run collapses is the message about the collapse.
+        # A request during which the run collapses is answered by the message about the collapse.
         ask = "filmOf(current()).send({ do: 'keep', part: 'input' }); return window.kept"
         wait_for(lambda script=ask: opened.run(script))
         with (
@@ -181,7 +181,7 @@ def repeated(browser):
 
 
 def test_the_mouse_grips_each_side_from_both_faces(opened):
-    """The pointer has another shape within 12 pixels of a side, which it drags inwards."""
+    """The pointer changes its shape within 12 pixels of a side, which it drags inwards."""
     names = ("left", "right", "bottom", "top")
     cursor = "return filmOf(current()).document.getElementById('stage').style.cursor[0]"
     for shift, number in itertools.product((-12, 12), range(4)):
@@ -226,7 +226,7 @@ def test_a_dragged_side_follows_the_mouse_and_then_stays(opened):
         wait_for(lambda: inside(opened, "past.at(-1).time") > time)
         return inside(opened, right) == place
 
-    wait_for(stays)  # the side moves until the worker has received that it was released
+    wait_for(stays)  # the side moves until the worker has been told of its release
     opened.press("p")
     wait_for(lambda: not inside(opened, "state.playing"))
     place = inside(opened, right)
@@ -291,7 +291,7 @@ def test_a_paused_run_goes_back_step_by_step_and_on(opened):
 
 
 def test_the_frame_before_a_change_is_one_step_back(opened):
-    """A change of the paused run replaces the newest frame, and adds none."""
+    """A change of the paused run replaces the newest frame and adds none."""
     wait_for(lambda: inside(opened, "past.length") > 3)
     opened.press("p")
     wait_for(lambda: not inside(opened, "state.playing"))
@@ -338,7 +338,7 @@ def test_what_is_clicked_is_downloaded_or_measured(opened, tmp_path):
     assert "mean kinetic energy against speed" in opened.run("return $('points').innerText")
 
 
-LINKS = {  # the values of an address, and a property of the film
+LINKS = {  # values in an address, and a property of the film
     "a number": ("crater", {"species.projectile.mass": "50"}, ("kinds[1].mass", 50)),
     "a vector": ("gas", {"box.gravity": "0,-2"}, ("film.gravity", [0, -2])),
     "an added group": (
@@ -352,7 +352,7 @@ LINKS = {  # the values of an address, and a property of the film
 
 @pytest.mark.parametrize("case", mostly(LINKS, ["an added group", "letters"]))
 def test_the_address_holds_input_and_values_and_brings_them_back(opened, case):
-    """A link, the page of the link loaded again, and values chosen on the page lead to one run."""
+    """A link, the reloaded page of the link, and values chosen on the page lead to the same run."""
     name, settings, (what, value) = LINKS[case]
     before = opened.run("return current().run")
     start = "const [name, settings] = arguments; choose(name, settings)"
@@ -393,7 +393,7 @@ def test_an_address_with_mistakes_shows_a_run_and_the_mistake(opened):
         assert opened.run("return [state.input.name, location.hash]") == ["gas", "#input=gas"]
 
 
-#: Values of the group `&contact`, from which the values of other variables follow.
+#: Values in the group `&contact` on which the values of other variables depend.
 LAWS = [
     {"restitution": 0.8, "wall_rule": "velocity"},
     {"restitution": 0.6, "wall_rule": "normal", "tangential_restitution": 0.25, "friction": 0.35},
@@ -407,7 +407,7 @@ AT_SLIDER = """const at = state.input.sliders.findIndex(({ key }) => key === arg
 
 
 def test_a_variable_without_a_value_shows_the_value_that_acts(opened):
-    """Its default can be the value of another variable, which changes."""
+    """Its default may be the value of another variable, which changes."""
     before, side = opened.run("return current().run"), {"side.left.motion": "still"}
     opened.run("choose('cooling', arguments[0])", side)
     moving(opened, before)

@@ -1,4 +1,4 @@
-"""The laboratory with two to four disks: arrows that are dragged, momentum, energy, restitution."""
+"""Laboratory with two to four disks: dragged arrows, momentum, energy, restitution."""
 
 import numpy as np
 import pytest
@@ -12,21 +12,21 @@ from whole_runs import wait_for
 
 MASSES = np.array([1.0, 2.0])
 PHONE = (390, 844)  #: size of the window
-#: The texts of a table, row by row; fields count by their values.
+#: Texts of a table, row by row, with the values of fields.
 CELLS = """const { rows } = filmOf(current()).document.getElementById(arguments[0]);
     const text = one => one.firstElementChild?.value ?? one.textContent;
     return [...rows].slice(1).map(row => [...row.cells].map(text));"""
 CLICK = "filmOf(current()).document.getElementById(arguments[0]).click()"
 TEN_TIMES_FASTER = """const pace = filmOf(current()).document.getElementById('pace');
     pace.value = 1; pace.dispatchEvent(new Event('input'));"""
-#: The place where the arrow of a disk ends, in the box.
+#: Position in the box of the tip of a disk's arrow.
 TIP = """const film = filmOf(current()), [i] = arguments;
     return film.tipOf(i);"""
 
 
 @pytest.fixture
 def two(opened):
-    """Return the laboratory with two disks that wait for their collision."""
+    """Return the laboratory with two disks before their collision."""
     opened.run("choose('collision')")
     opened.until("return !busy && current().wished.input === 'collision'")
     opened.until("return !!filmOf(current()).inside?.().film?.masses")
@@ -47,7 +47,7 @@ def bodies(browser):
 
 
 def rerun(browser, action):
-    """Do something that starts a new run, and wait until the film shows it."""
+    """Perform an action that starts a new run, and wait until the film shows it."""
     before = browser.run("return current().run")
     action()
     browser.until("return !busy && current().run > arguments[0]", before)
@@ -55,7 +55,7 @@ def rerun(browser, action):
 
 
 def collide(browser):
-    """Step to the next collision of two disks, and return it."""
+    """Step to the next disk-disk collision, and return it."""
     known = len(inside(browser, "encounter.collisions"))
     while len(inside(browser, "encounter.collisions")) == known:
         time = inside(browser, "moment.time")
@@ -208,7 +208,7 @@ def test_disks_are_added_up_to_four_and_removed(two):
     assert two.run("return location.hash") == "#input=collision"
 
 
-#: The parts of the panel that must be seen without scrolling in a window of a computer.
+#: Parts of the panel that must be visible without scrolling in a window of a computer.
 SEEN = """const film = filmOf(current()), end = film.document.documentElement.clientHeight;
     const low = id => film.document.getElementById(id).getBoundingClientRect().bottom;
     const parts = ['play', 'stage', 'bodies', 'polygon', 'inelastic', 'balance'];
@@ -220,7 +220,7 @@ SIZES = [(1280, 800), (1366, 768), (1024, 768), PHONE]
 
 @pytest.mark.parametrize("size", mostly(SIZES, [(1366, 768), PHONE]))
 def test_nothing_of_the_panel_is_cut(two, size):
-    """With three disks and numbers of all lengths."""
+    """With three disks, and numbers of all lengths."""
     two.resize(*size)
     rerun(two, lambda: two.run(CLICK, "more"))
     rerun(two, lambda: two.run("redefine('disk1', 'velocity', [-0.123456, 0.654321])"))

@@ -1,4 +1,4 @@
-"""The page of the laboratory: contrast, accessibility and visibility on screens of all sizes."""
+"""Page of the laboratory: contrast, accessibility and visibility on screens of all sizes."""
 
 import re
 from decimal import Decimal
@@ -12,7 +12,7 @@ from whole_runs import wait_for
 
 
 def test_disks_can_be_told_from_both_grounds_and_species_in_grey(simulated, browser, tmp_path):
-    """The contrast is at least 3 to 1, as required by WCAG 2.2 for graphics (1.4.11)."""
+    """The contrast is at least 3 to 1, as WCAG 2.2 requires for graphics (1.4.11)."""
     species = "".join(f"&species count = 3 radius = 0.0{k} speed = 1 /\n" for k in (1, 2, 3, 4))
     run = simulated(species + "&stop time = 1 /\n")
     (tmp_path / "film.html").write_text(whole(run))
@@ -63,7 +63,7 @@ def test_the_first_key_leads_to_the_film_and_larger_text_stays_in_its_card(opene
 
 @pytest.fixture
 def paused(opened):
-    """Return the laboratory with a film that stands still, and need not be drawn all the time."""
+    """Return the laboratory with a paused film, which need not be redrawn all the time."""
     opened.run("filmOf(current()).play(false)")
     opened.until("return !filmOf(current()).inside().state.playing")
     return opened
@@ -80,7 +80,7 @@ def test_every_title_fits_into_a_telephone_and_the_controls_are_seen(paused):
     paused.until(f"{ends}.reduce((play, frame) => play <= frame)")
 
 
-#: Sizes of windows, of which some are so narrow that the sliders are hidden at first.
+#: Window sizes, some of them so narrow that the sliders are hidden at first.
 SIZES = [(1280, 800), (1366, 768), (1920, 1080), (1024, 768), (820, 1180), (390, 844)]
 #: Rows of the table with the longest numbers: tiny, large, and negative.
 ROWS = [
@@ -96,7 +96,7 @@ SHOW_ROWS = """for (const film of films().filter(one => one.inside().film)) {
     }
     overlayAll();
     filmOf(leader()).layout();"""
-#: The visible parts of the page and of its films that are wider than their place or the window.
+#: Visible parts of the page and of its films that are wider than their place or the window.
 WIDE = """const isShown = one => one.offsetParent && getComputedStyle(one).visibility === 'visible';
     const isCut = one => one.clientWidth && one.scrollWidth > one.clientWidth + 1
       && !one.matches('input, select, #status, #name, .caption, :has(> #stage), #main, #stage');
@@ -108,7 +108,7 @@ WIDE = """const isShown = one => one.offsetParent && getComputedStyle(one).visib
       return [...(scrollWidth > clientWidth ? [page.title || 'film'] : []),
         ...wide.map(one => one.outerHTML.slice(0, 90))];
     });"""
-#: Left, top, right and bottom of the picture, and those of other parts, in window coordinates.
+#: Left, top, right and bottom of the picture and of other parts, in window coordinates.
 PLACES = """const box = leader(), { x, y } = box.frame.getBoundingClientRect();
     const place = ({ left, top, right, bottom }) => [left + x, top + y, right + x, bottom + y];
     const form = $('form').getBoundingClientRect();
@@ -119,7 +119,7 @@ PLACES = """const box = leader(), { x, y } = box.frame.getBoundingClientRect();
 
 
 def test_nothing_is_cut_in_windows_of_all_sizes(paused):
-    """Scroll bars have their usual width, and numbers are as long as they can be."""
+    """Scroll bars have their usual width, and numbers are as long as possible."""
     for width, height in SIZES:
         paused.resize(width, height)
         is_narrow, is_phone = width < 1100, width < 700

@@ -1,4 +1,4 @@
-"""Open systems in the player and in the laboratory: disks that leave and enter, and their doors."""
+"""Open systems in the player and the laboratory: disks that leave and enter, and their doors."""
 
 import asyncio
 import base64
@@ -25,7 +25,7 @@ OPEN = """
 &stop time = 2 /
 &output frames_every_time = 0.1 observables_every_time = 0.1 event_log = .true. /
 """
-#: Number of pixels that disks cover, in units of the square of the unit of length.
+#: Number of pixels covered by disks, in squares of the unit of length.
 AREA = """drawStage(); return pixels.filter(one => one >>> 24 > 127).length / view.unit ** 2"""
 
 
@@ -140,7 +140,7 @@ DOORS = "return [...$('doors').children].map(one => one.textContent)"
 
 
 def test_the_buttons_of_a_pump_add_disks_and_open_and_close_its_lid(opened):
-    """The script repeats it, and nothing is cut in any window."""
+    """The script repeats this, and nothing is cut in any window."""
     assert opened.run(DOORS) == []
     before = opened.run("return current().run")
     opened.run("choose('pump')")

@@ -1,4 +1,4 @@
-"""The page of the laboratory on touch screens, where the same fingers scroll the page."""
+"""Page of the laboratory on touch screens, where the same fingers scroll the page."""
 
 import pytest
 
@@ -7,13 +7,13 @@ from sampling import mostly
 from whole_runs import wait_for
 
 SIZES = {"tablet": (1024, 768), "telephone": (390, 844)}
-#: Numbers of events that the stage receives, and the distances by which film and form are scrolled.
+#: Numbers of events that the stage receives, and the distances by which film and form scroll.
 HEARD = """const stage = filmOf(current()).document.getElementById('stage');
     window.heard = {};
     for (const kind of ['pointerdown', 'pointermove', 'pointerup', 'pointercancel'])
       stage.addEventListener(kind, () => { heard[kind] = (heard[kind] ?? 0) + 1; });"""
 SCROLLED = "[filmOf(current()).scrollY, scrollY, $('form').scrollTop]"
-#: The centre of an element of the film and of the form, in window coordinates.
+#: Centre of an element of the film and of the form, in window coordinates.
 IN_FILM = """const one = filmOf(current()).document.getElementById(arguments[0]);
     const frame = current().frame.getBoundingClientRect(), box = one.getBoundingClientRect();
     return [frame.x + box.x + box.width / 2, frame.y + box.y + box.height / 2, frame.bottom];"""
@@ -24,7 +24,7 @@ SLIDER = """const one = document.querySelectorAll('.slider [type=range]')[argume
 
 @pytest.fixture(params=mostly(SIZES, ["telephone"]))
 def touched(opened, request):
-    """Return the laboratory on a screen with fingers when five large disks move."""
+    """Return the laboratory on a touch screen once five large disks move."""
     opened.resize(*SIZES[request.param], True)
     opened.protocol("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=5)
     before = opened.run("return current().run")
@@ -32,14 +32,14 @@ def touched(opened, request):
     opened.run("choose('gas', arguments[0])", settings)
     moving(opened, before)
     opened.run(HEARD)
-    # With few plots the film of a tablet is no longer than its window, and could not be scrolled.
+    # With few plots the film on a tablet is no longer than its window and could not be scrolled.
     opened.run("filmOf(current()).document.body.style.paddingBottom = '400px'")
     yield opened
     opened.protocol("Emulation.setTouchEmulationEnabled", enabled=False)
 
 
 def path(start, end, steps=12):
-    """Return places on a straight line."""
+    """Return positions on a straight line."""
     return [
         [a + (b - a) * k / steps for a, b in zip(start, end, strict=True)] for k in range(steps + 1)
     ]
@@ -51,7 +51,7 @@ def paused(browser):
 
 
 def to_the_top(browser):
-    """Undo all scrolling, including the part that has not reached the page yet."""
+    """Undo all scrolling, including any that has not reached the page yet."""
     browser.draw(3)
     browser.run("filmOf(current()).scrollTo(0, 0); $('form').scrollTop = 0")
     wait_for(lambda: browser.run(f"return {SCROLLED}") == [0, 0, 0])
@@ -86,9 +86,9 @@ def test_a_finger_drags_each_side_and_scrolls_nothing(touched):
 
 
 def test_a_finger_elsewhere_scrolls_the_page_and_changes_nothing(touched):
-    """Also along a side and, while the run is paused, on a disk that was not selected.
+    """This includes a finger along a side and, in a paused run, on a disk that was not selected.
 
-    This takes 5 to 10 s, because the browser draws the moving disks during long gestures.
+    It takes 5 to 10 s, because the browser draws the moving disks during long gestures.
     """
     starts = [pixel(touched, 0.5, 0.4), pixel(touched, 0.005, 0.4)]
     for start in starts:

@@ -1,4 +1,4 @@
-"""The player: content of its file and, in a browser, paths, pictures, controls and event log."""
+"""The player: contents of its file and, in a browser, paths, pictures, controls and event log."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from whole_runs import wait_for
 
 
 def bouncing_gas(path, rng, frames=40, count=60, **more):
-    """Write a run of drifting disks; the second half of them is a heavier species."""
+    """Write a run of drifting disks, the second half of them a heavier species."""
     velocity = maxwell_velocities(rng, frames, count)
     phase = rng.uniform(0, 6, (1, count, 2))
     position = 0.5 + 0.3 * np.cos(np.arange(frames)[:, None, None] / 9 + phase)
@@ -69,7 +69,7 @@ def test_speeds_are_counted_at_the_moment_and_so_far(playing, tmp_path, rng):
 
 
 def test_speeds_beside_disks_at_rest_are_counted_by_factors(playing, tmp_path, rng):
-    """In a linear histogram, the bar of resting disks in a crater would hide all other bars."""
+    """In a linear histogram of a crater, the bar of resting disks would dwarf all others."""
     velocity = maxwell_velocities(rng, 5, 60) * np.array([1e-2, 1.0, 1.0])[np.arange(60) % 3, None]
     velocity[:, ::4] = 0
     observables = {"collisions": np.zeros(5)}
@@ -97,7 +97,7 @@ def test_a_film_keeps_to_its_room(tmp_path, rng, monkeypatch):
 
 # --- texts of others ---
 
-#: Texts that would be executed or displayed wrongly by a page that does not escape them.
+#: Texts that a page without escaping would execute or display wrongly.
 HOSTILE = (
     "</title></script><script>document.title='taken'</script>",
     "<img src=x onerror=\"document.title='taken'\">",
@@ -147,7 +147,7 @@ def test_the_policy_of_the_page_stops_what_is_not_its_own(opened):
 
 
 def stage(browser) -> str:
-    """Return all layers of the drawing as a text."""
+    """Return all layers of the drawing as text."""
     return browser.run("return layers.map(layer => layer.toDataURL()).join()")
 
 
@@ -228,7 +228,7 @@ def test_a_click_on_a_disk_shows_its_trace(playing, tmp_path, rng):
 
 
 def test_disks_have_their_true_size(opened):
-    """The area of the pixels of a colour is compared with the area of the disk, large and small."""
+    """The area of the pixels of a colour is compared with that of a large and of a small disk."""
     for zoom in (1, 12):
         area, radius = opened.run(
             """state.colour = 'species'; refresh(); step(0);
@@ -247,7 +247,7 @@ def test_disks_have_their_true_size(opened):
 
 
 def colours_at(browser, *points):
-    """Return the colours of the stage at points of the box in units of its edges."""
+    """Return the colours of the stage at points of the box, relative to its edges."""
     return browser.run(
         """return arguments[0].map(([x, y]) => {
           const [px, py] = [[x, 0], [y, 1]].map(([s, k]) => film.lower[k] + s * film.edges[k]);
@@ -375,7 +375,7 @@ def test_events_to_come_are_those_of_the_log(simulated, playing, box):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
-    """In random systems no disk is beyond a side, disks touch it in collisions, as logged."""
+    """In random systems no disk is beyond a side, and disks touch it in the logged collisions."""
     rng = np.random.default_rng(seed)
     text = f"&run seed = {seed} /\n&box lower = -3, 2 upper = -1.8, 3.1 /\n" + FEW
     for name in rng.choice(SIDES, rng.integers(1, 4), replace=False):
@@ -421,7 +421,7 @@ def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
 
 
 def test_disks_with_unknown_paths_stand_as_in_the_frame_and_the_film_says_so(simulated, playing):
-    """Straight flights would be wrong, because disks are reflected by walls."""
+    """Straight flights would be wrong, because walls reflect disks."""
     run = simulated("&box boundary = 'periodic', 'wall' /\n" + FEW)
     browser = playing(run.path)
     browser.run("state.arrows = true; go(0.45 * last())")
@@ -445,7 +445,7 @@ def test_disks_with_unknown_paths_stand_as_in_the_frame_and_the_film_says_so(sim
 
 
 def test_time_is_that_of_the_run_whenever_frames_are_taken(playing, simulated):
-    """With frames at unequal times, half of the film's time is half of the distance."""
+    """With unequally spaced frames, half of the film's time is half of the distance."""
     run = simulated(
         """&species name = 'a' radius = 0.01 position = 0.05, 0.05 velocity = 0.08, 0.08 /
         &output frames_at = 0.1, 0.2, 0.3 event_log = .true. / &stop time = 10 /"""
@@ -455,7 +455,7 @@ def test_time_is_that_of_the_run_whenever_frames_are_taken(playing, simulated):
     browser.run("go(5)")
     assert browser.run("return [X[0], Y[0]]") == pytest.approx([0.45, 0.45])
     assert browser.run("return +$('scrub').value") == pytest.approx(0.5)
-    # The test triggers each picture, with a simulated rate of 60 per second.
+    # The test triggers each picture, simulating a rate of 60 per second.
     browser.run("window.requestAnimationFrame = draw => { window.draw = draw; }")
     browser.run("pace = 1; $('pace').value = 0; go(0); play(true); window.now = performance.now()")
     second = """draw(now); const start = moment.time;
@@ -520,7 +520,7 @@ def test_the_camera_follows_the_clicked_disk(gas):
         return gaps;"""
     )
     assert len(gaps) > 3 and max(gaps) < 1
-    gas.point("mouse", [(200, 200), (230, 200), (260, 200)])  # a drag ends following a disk
+    gas.point("mouse", [(200, 200), (230, 200), (260, 200)])  # a drag stops following a disk
     assert gas.run("return camera.follow") == -1
 
 
@@ -554,7 +554,7 @@ def test_box_and_controls_are_seen_without_scrolling(browser, playing, tmp_path,
 
 
 def controls_are_seen(browser, size, edges):
-    """Test the places of the controls of a film in a window of one of the `SIZES`."""
+    """Test the positions of the controls of a film in a window of one of the `SIZES`."""
     width, height, phone = SIZES[size]
     assert browser.run("return document.documentElement.scrollWidth") <= width
     boxes = {
@@ -568,7 +568,7 @@ def controls_are_seen(browser, size, edges):
             assert box["top"] >= 0 and box["bottom"] <= height, (name, box)
     assert boxes["stage"]["height"] >= (110 if edges == (3, 1) or size == "upright" else 260)
     assert boxes["play"]["height"] >= (44 if phone else 38)
-    if phone:  # the histogram and the disks are visible together
+    if phone:  # histogram and disks are visible together
         assert boxes["histogram"]["bottom"] < height and boxes["histogram"]["height"] > 70
     if size == "wide":
         assert boxes["energy"]["right"] > 1860 and boxes["energy"]["bottom"] < 1080

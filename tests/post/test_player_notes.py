@@ -1,4 +1,4 @@
-"""Names, curves and notes of the player that depend on the system of a run."""
+"""Names, curves and notes in the player that depend on the system of a run."""
 
 import pytest
 
@@ -41,7 +41,7 @@ def test_no_pressure_is_drawn_under_gravity(simulated, playing, g):
 
 
 def test_recycled_disks_jump_and_no_event_log_would_help(simulated):
-    """The reason is not that a driving changes velocities between frames."""
+    """The reason given is not that driving changes velocities between frames."""
     drive = "&drive kind = 'recycle' interval = 0.1 from_region = 0, 1, 0, 0.2 "
     drive += "to_region = 0, 1, 0.5, 1 velocity = 0, -1 /"
     run = simulated(TRACERS + drive)

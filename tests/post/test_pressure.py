@@ -38,7 +38,7 @@ def simulated(program, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("kind", INPUTS)
 def test_the_area_is_that_of_the_pressure_in_the_file(simulated, kind):
-    """At each sample the program divides K + W / 2t by this area."""
+    """The program divides K + W / 2t by this area at each sample."""
     run = simulated(INPUTS[kind])
     time, pressure = run.observable("virial_pressure")
     virial = run.observable("virial").value
@@ -51,7 +51,7 @@ def test_the_area_is_that_of_the_pressure_in_the_file(simulated, kind):
 
 
 def test_the_pressure_of_a_whole_run_is_the_last_one_in_the_file(simulated):
-    """The two are equal if the kinetic energy is constant."""
+    """They are equal if the kinetic energy is constant."""
     run = simulated(INPUTS["obstacle"])
     assert run.pressure(0, 2) == pytest.approx(
         run.observable("virial_pressure").value[-1], rel=1e-12
@@ -64,7 +64,7 @@ def moment(run, frame) -> float:
 
 
 def test_the_pressure_is_less_than_the_force_per_length_of_a_wall(simulated):
-    """It is smaller by the factor 1 - 2 r / L of the laws page."""
+    """It is smaller by the factor 1 - 2 r / L (docs/explanation/laws.md)."""
     run = simulated("&box upper = 2, 1 /\n")
     (time,), (impulse,) = run.time[[-1]], run.observable("side_impulse").value[[-1]]
     (width, height), r = run.edges, run.radius[0]
@@ -127,7 +127,7 @@ def test_the_means_are_over_time(tmp_path):
 
 
 def test_the_curve_of_a_mixture_ends_before_equal_disks_freeze(tmp_path):
-    """Above it Henderson's equation goes on, and the figure names what has no reference."""
+    """Above, Henderson's equation continues, and the figure names the points without reference."""
     x, radius = np.random.default_rng(1).uniform(size=(1, 4, 2)), np.array([1, 1, 1.4, 1.4])
     run = written(tmp_path / "a.h5", x, x, radius=0.01 * radius)
     ways = {f"Z_{name}{end}": 20.0 for name in equation_of_state.WAYS for end in ("", "_error")}

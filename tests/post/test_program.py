@@ -22,7 +22,7 @@ from synthetic_run import ROOT
 from whole_runs import STOPPED, USAGE, differences, environment, is_asleep, ran, wait_for
 
 THIRD = 0.1 / 3
-#: All kinds of values: repeated groups, texts with quotes, pairs, logicals, arrays of NumPy.
+#: Values of all kinds: repeated groups, strings with quotes, pairs, logicals, arrays of NumPy.
 GROUPS = {
     "run": {"title": np.str_("it's a test"), "seed": np.array(5)},
     "box": {"lower": np.array([-1, 0], np.int8), "boundary": ["periodic", "wall"]},
@@ -112,13 +112,13 @@ def test_nothing_is_left_of_a_run_without_output(tmp_path):
 
 
 def left(folder):
-    """Folders of temporary runs."""
+    """Return the folders of temporary runs."""
     return [path for path in folder.iterdir() if path.name.startswith("ricochet-")]
 
 
 @pytest.fixture
 def temporary(tmp_path, monkeypatch):
-    """The folder where temporary files are made, in worker processes, too."""
+    """Return the folder for temporary files, which worker processes use, too."""
     (tmp_path / "tmp").mkdir()
     monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
     monkeypatch.setattr(tempfile, "tempdir", None)
@@ -181,7 +181,7 @@ def test_worker_processes_leave_no_temporary_folders(temporary):
 
 
 class Notebook(io.StringIO):
-    """In a terminal, the user interrupts Python as soon as progress is shown."""
+    """Stream on which showing any progress interrupts Python, as a user may do in a notebook."""
 
     def isatty(self) -> bool:
         return True
@@ -194,9 +194,9 @@ class Notebook(io.StringIO):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch, number):
-    """A notebook interrupts Python only; the program ends whenever Python ends."""
+    """A notebook interrupts only Python; the program ends whenever Python ends."""
     (tmp_path / "gas.nml").write_text(TEXT)
-    endless = {"stop.collisions": 10**12, "output.event_log": False}  # a log is too big
+    endless = {"stop.collisions": 10**12, "output.event_log": False}  # a log would be too big
     code = f"import ricochet; ricochet.run('gas.nml', {endless}, 'long.h5')"
     paths = environment(PYTHONPATH=ROOT / "post")
     python = subprocess.Popen(
@@ -259,7 +259,7 @@ def test_overrides_may_be_nested_and_are_named_in_messages(begin):
 
 @pytest.mark.parametrize("velocity", [None, (1, 2), [(k, -k) for k in range(3)]])
 def test_disks_may_have_radii_and_masses_of_their_own(tmp_path, temporary, velocity):
-    """The starting file stands beside the output, so that a run can be resumed."""
+    """The initial-configuration file is beside the output, so that the run can be resumed."""
     own = {"radius": np.array([0.01, 0.02, 0.03]), "mass": [1, 2, 0.1], "name": "odd"}
     own["position"] = [(0.2, 0.2), (0.5, 0.5), (0.8, 0.8)]
     own |= {"speed": 1} if velocity is None else {"velocity": velocity}
@@ -295,7 +295,7 @@ def test_file_names_may_begin_with_a_dash(tmp_path):
 
 
 def test_a_missing_program_is_named(monkeypatch, tmp_path):
-    """The message names RICOCHET's path or, outside of a clone, the search path."""
+    """The message gives the path in RICOCHET or, outside a clone, the search path."""
     monkeypatch.setenv("RICOCHET", "nowhere")
     with pytest.raises(ProgramError, match="no program ricochet at nowhere: run make"):
         package.run(GROUPS)

@@ -10,7 +10,7 @@ from synthetic_run import drawn, written
 
 
 def test_kicked_disks_have_the_diffusion_of_their_displacements_alone(simulated, monkeypatch):
-    """With free flights of the time h, D is kT h / 2 m; velocities would yield 2 D."""
+    """For free flights of duration h, D is kT h / 2 m; velocities would yield 2 D."""
     run = simulated(
         """&box boundary = 'periodic', 'periodic' /
         &species count = 100 packing_fraction = 0.0005 temperature = 2 mass = 2 /
@@ -39,7 +39,7 @@ def test_free_paths_weigh_each_flight_once_however_often_frames_meet_it(tmp_path
 
 
 def test_free_paths_scatter_as_their_errors_say(monkeypatch, rng):
-    """Errors from several runs and from blocks of one run, with 4000 independent paths per run."""
+    """Errors from several runs, and from blocks of one run, of 4000 independent paths each."""
     monkeypatch.setattr(
         rates, "free_paths", lambda run, skip: (rng.exponential(2.0, 4000), np.ones(4000))
     )

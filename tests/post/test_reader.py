@@ -32,7 +32,7 @@ def tiny(path, frames=1, count=1, **more):
 
 @pytest.fixture
 def small(tmp_path):
-    """Return three frames of two disks that move apart."""
+    """Return three frames of two disks moving apart."""
     x = np.array([[[0.2, 0.5], [0.7, 0.5]], [[0.1, 0.5], [0.8, 0.5]], [[0.0, 0.5], [0.9, 0.5]]])
     return write_run(tmp_path / "small.h5", x, 0 * x, collisions=[[0, 0], [1, 0], [3, 2]])
 
@@ -224,7 +224,7 @@ def test_scripts_answer_a_bad_file_with_one_line_and_exit_2(tmp_path, script, ca
 
 @pytest.mark.parametrize("mode", ["r", "r+"])
 def test_a_file_that_the_same_process_has_open_is_not_called_damaged(tmp_path, mode):
-    """h5py refuses another mode, or another locking, for a file that is open."""
+    """h5py refuses an open file in another mode, or with other locking."""
     path = tiny(tmp_path / "good.h5")
     with h5py.File(path, mode), pytest.raises(RunError, match="this process has opened it"):
         read_run(path)
@@ -233,7 +233,7 @@ def test_a_file_that_the_same_process_has_open_is_not_called_damaged(tmp_path, m
 
 @pytest.fixture
 def unfinished(ricochet, tmp_path) -> Path:
-    """Return the output of a run that was stopped by the limit of its wall time."""
+    """Return the output of a run stopped by its limit of wall time."""
     write_input(tmp_path, MIXTURE)
     run = ricochet("gas.nml", "-o", "gas.h5", "--set", "stop.wall_clock=1e-9")
     assert run.returncode == STOPPED
@@ -242,7 +242,7 @@ def unfinished(ricochet, tmp_path) -> Path:
 
 @pytest.mark.parametrize("cuts", [12, pytest.param(300, marks=pytest.mark.check)])
 def test_a_file_cut_anywhere_is_refused(unfinished, ricochet, tmp_path, cuts):
-    """The file is that of a finished run or of an unfinished run."""
+    """The file is that of a finished or of an unfinished run."""
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
     for whole in (unfinished, tmp_path / "whole.h5"):
         data, path = whole.read_bytes(), tmp_path / "cut.h5"
@@ -258,7 +258,7 @@ def test_a_file_cut_anywhere_is_refused(unfinished, ricochet, tmp_path, cuts):
 BOTH = "&output frames_every_time = 0.2 observables_every_time = 0.2 {}/\n"
 OUTPUT = "&stop time = 1e5 / " + BOTH
 SHORT = OUTPUT.format("")
-LONGER = SHORT.replace("1e5", "1e6")  # of few disks
+LONGER = SHORT.replace("1e5", "1e6")  # for few disks
 PAIR = "&species name = 'one' count = 1 radius = 0.1 position = {}, 0.3 velocity = 1, 0.3 /\n"
 CHAOTIC = "&obstacle centre = 0.5, 0.7 radius = 0.2 /\n" + PAIR
 LORENTZ = """&box boundary = 'periodic', 'periodic' / &obstacle centre = 0.5, 0.5 radius = 0.35 /
@@ -309,7 +309,7 @@ ENDINGS = {"animate": "gif", "export": "xyz", "player": "html"}
 def test_running_simulations_are_drawn(started, tmp_path, system, capsys):
     """The simulation is suspended while the scripts read its file, and has not finished.
 
-    All scripts that a system allows draw their figures.  The first and the fifth system use 5 to
+    All scripts that apply to a system draw their figures. The first and the fifth system take 5 to
     9 s, because nine and five scripts draw them.
     """
     texts, scripts = RUNNING[system]
@@ -339,7 +339,7 @@ def test_running_simulations_are_drawn(started, tmp_path, system, capsys):
 
 
 def test_every_script_draws_a_running_simulation():
-    """`cost` and `scaling`, which require complete runs, and `coverage` are excepted."""
+    """Except `cost` and `scaling`, which require complete runs, and `coverage`."""
     drawn = {script for _, scripts in RUNNING for script in scripts}
     assert drawn == {*SCRIPTS} - {"cost", "coverage", "scaling"}
 
@@ -355,8 +355,8 @@ def test_every_script_draws_a_running_simulation():
     ],
 )
 def test_a_run_that_met_no_stop_rule_says_so(tmp_path, monkeypatch, capsys, name, note, said):
-    """The warning is printed and drawn in red on the figure."""
-    kinds = {"species": [1, 1, 2], "names": ("a", "b")} if note else {}  # with a legend there
+    """The warning is printed, and drawn in red on the figure."""
+    kinds = {"species": [1, 1, 2], "names": ("a", "b")} if note else {}  # with a legend
     run = tiny(tmp_path / name, 4, 3, provenance={"git_commit": "abc", "note": note}, **kinds)
     texts = []
 
@@ -381,7 +381,7 @@ def test_a_file_with_the_names_of_an_earlier_version_is_refused_in_one_line(tmp_
 
 
 def test_of_an_ensemble_the_finished_members_are_taken_and_the_others_counted(tmp_path, capsys):
-    """Members without files are counted if all files are given; the warning is printed once."""
+    """Members without files count if all files are given; the warning is printed once."""
     note = {"git_commit": "abc", "note": "cooled to nothing"}
     runs = [tiny(tmp_path / f"{k}.h5", 4 + k, 3, provenance=note) for k in range(3)]
     (tmp_path / "9.h5.part").touch()
@@ -401,7 +401,7 @@ def test_of_an_ensemble_the_finished_members_are_taken_and_the_others_counted(tm
 
 # --- where results go ---
 
-#: Scripts that write results in different ways, with the option and the ending of the name.
+#: Scripts that write results in different ways, with the option and the file extension.
 WRITERS = [
     ("snapshot", "-o", "png"),
     ("cooling", "--csv", "csv"),
@@ -431,7 +431,7 @@ def test_a_full_disk_is_one_line(
 def test_results_are_written_into_files_of_ones_own(
     tmp_path, monkeypatch, capsys, script, option, ending
 ):
-    """Links, FIFOs and runs are not written to; other hard links of a file keep their content."""
+    """Links, FIFOs and runs are not written to; other hard links of a file keep its content."""
     monkeypatch.chdir(tmp_path)
     names = ("collisions", "all/kinetic_energy", "disk/kinetic_energy")
     run = tiny(Path("run.h5"), 4, 3, observables={name: np.arange(1.0, 5.0) for name in names})
@@ -515,7 +515,7 @@ def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
 
 
 def test_after_set_up_python_finds_the_package_from_any_folder(tmp_path):
-    """The test uses a copy of the files that set-up reads and a complete `.venv`."""
+    """The test uses a copy of the files that set-up reads, and a complete `.venv`."""
     package = "post/ricochet/__init__.py"
     for name in (
         ".ci/set-up",

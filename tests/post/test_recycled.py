@@ -106,7 +106,7 @@ def mouths(folder, widths, k, c, count=200, **grain):
 
 
 def test_the_rate_of_a_hopper_follows_the_law_that_it_has(tmp_path, capsys):
-    """The fits return the values with which the rates were made."""
+    """The fits return the parameters with which the rates were generated."""
     paths = mouths(tmp_path, (0.1, 0.15, 0.2, 0.3), k=1.4, c=0.7)
     rows = discharge.measured_rates([read_run(path) for path in paths], 4).rows
     assert [row["D_over_d"] for row in rows] == [5, 7.5, 10, 15]
@@ -125,7 +125,7 @@ def test_the_rate_of_a_hopper_follows_the_law_that_it_has(tmp_path, capsys):
 @pytest.mark.parametrize("widths", [3, 4])
 @pytest.mark.parametrize("runs", [1, 3])
 def test_68_of_100_fits_hold_the_law_however_few_the_widths(rng, widths, runs):
-    """The rates have random errors, which follow from the scatter of points or of three runs."""
+    """The errors of the rates are estimated from the scatter of points or of three runs."""
     held = []
     for _ in range(200):
         c, k = rng.uniform(0.5, 2), 1.4
@@ -140,7 +140,7 @@ def test_68_of_100_fits_hold_the_law_however_few_the_widths(rng, widths, runs):
 
 
 def test_a_rate_of_drawn_radii_has_the_error_of_their_scatter(tmp_path):
-    """Each seed has its own sample of radii; one run says nothing about the other samples."""
+    """Each seed has its own sample of radii; one run says nothing about the others."""
     drawn = {"polydispersity": 0.1}
     paths = [mouths(tmp_path / f"{c}", (0.2,), k=1.4, c=c, **drawn)[0] for c in (0.9, 1.0, 1.1)]
     runs = [read_run(path) for path in paths]
@@ -155,7 +155,7 @@ def test_a_rate_of_drawn_radii_has_the_error_of_their_scatter(tmp_path):
 
 
 def test_the_rate_of_one_mouth_is_drawn_against_time(tmp_path):
-    """The lines at the rate and at the number of disks meet the measured curves at the end."""
+    """The lines of the rate and of the number of disks meet the measured curves at the end."""
     runs = [read_run(path) for path in mouths(tmp_path, (0.2,), k=1.4, c=0.7)]
     result = ricochet.analyse("discharge", runs)
     left, right = result.figure().axes

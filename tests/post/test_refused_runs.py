@@ -1,4 +1,4 @@
-"""Runs for which the law of a script does not hold, and the messages that refuse these runs."""
+"""Runs to which the law of a script does not apply, and the messages that refuse them."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ HAFF = "smooth disks that only cool"
     ],
 )
 def test_runs_that_a_law_is_not_for_are_refused(tmp_path, capsys, script, unlike, words):
-    """The runs differ in one feature from a gas that cools in a periodic box."""
+    """The runs differ in one trait from a gas that cools in a periodic box."""
     speed, walled = unlike.pop("speed", 1.0), unlike.pop("walled", False)
     groups = {"contact": {"restitution": 0.9}, **unlike}
     v, time = speed * np.ones((2, 4, 2)), np.array([0.0, 1.0])
@@ -90,7 +90,7 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
     ],
 )
 def test_runs_that_a_script_is_not_for_are_refused(gas, tmp_path, capsys, unusual, refused):
-    """The message is one line; scripts that compare runs also receive a suitable run."""
+    """The message is one line; scripts that compare runs also receive a suitable one."""
     path = gas(**{"length": 20} | unusual).path
     for script, said in refused.items():
         compared = script == "correlations" or unusual is MIXED
@@ -109,6 +109,6 @@ NEEDY = (
 
 @pytest.mark.parametrize("script", [*NEEDY.split(), "speeds", "transport"])
 def test_a_run_for_which_the_law_does_not_hold_is_refused_with_exit_1(simulated, capsys, script):
-    """The runs have two equal disks between walls; errors of files and options are exit 2."""
+    """The runs have two equal disks between walls; errors of files and options exit with 2."""
     run = simulated("&species count = 2 radius = .05 speed = 1 / &stop time = 20 /" + EVERY)
     assert str(run.path) in refusal(capsys, script, run.path, code=1)

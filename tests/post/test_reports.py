@@ -18,14 +18,14 @@ from synthetic_gases import falling, gas
 from synthetic_run import ROOT, run_script
 from whole_runs import wait_for
 
-MOST_LINES = 60  # of the script of an analysis
+MOST_LINES = 60  # lines in the script of an analysis
 MOST_LINES_OF_HELP = 40
-MOST_LINES_OF_OTHERS = 150  # of scripts that belong to no analysis
+MOST_LINES_OF_OTHERS = 150  # lines in scripts that belong to no analysis
 
 
 @pytest.fixture
 def runs(tmp_path, rng):
-    """Return a file for each analysis that synthetic runs have the data for."""
+    """Return a file for each analysis to which synthetic runs are suited."""
     one = gas(tmp_path / "gas.h5", rng)
     return {
         "speeds": [one, gas(tmp_path / "more.h5", rng, count=300)],
@@ -41,7 +41,7 @@ def text_of_cells(rows):
 
 @pytest.mark.parametrize("name", ricochet.analyses)
 def test_each_analysis_has_a_short_script_with_the_same_line(name):
-    """The first line of the script's help text is the line of the registry."""
+    """The first line of the script's help text is the line in the registry."""
     path = ROOT / f"post/{name}.py"
     text = path.read_text()
     help_text = ast.get_docstring(ast.parse(text))
@@ -84,7 +84,7 @@ def test_a_script_prints_the_table_of_the_function(tmp_path, capsys, runs):
 
 @pytest.mark.parametrize("width", [None, "8.5cm", "slide", 20])
 def test_no_text_of_a_figure_is_below_eight_points(runs, width):
-    """The figure has the demanded width, and panels of a narrow figure are stacked."""
+    """The figure has the requested width, and a narrow figure has stacked panels."""
     for name, paths in runs.items():
         result = ricochet.analyse(name, paths)
         figure = result.figure(width=width)

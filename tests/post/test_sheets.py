@@ -1,4 +1,4 @@
-"""Figures of all analyses: sizes of text, stacked panels, single panels, meaning of error bars."""
+"""Figures of all analyses: sizes of text, stacked and single panels, meaning of error bars."""
 
 import pytest
 from matplotlib.collections import FillBetweenPolyCollection
@@ -44,7 +44,7 @@ to_region = 0, 1, 0.7, 1 / &contact restitution = 0.9 contact_time = 1e-4 /
 &stop time = 8 /
 """ + TIMED.format(0.05, "")
 SEEDS = ("run.seed=1", "run.seed=2")
-#: Inputs, settings of the runs of each input, and options of the analyses of simulated runs.
+#: Inputs with settings of their runs, and options of the analyses of these runs.
 SIMULATED = {
     "contacts": ([LONG], SEEDS[:1], {}),
     "correlations": ([LONG], SEEDS, {}),
@@ -83,7 +83,7 @@ SYNTHETIC = {
 
 @pytest.fixture
 def analysed(simulated, tmp_path, rng):
-    """Return a function that analyses small runs for which an analysis is made."""
+    """Return a function that runs an analysis on small runs suited to it."""
 
     def result_of(name):
         if name in SYNTHETIC:
@@ -97,7 +97,7 @@ def analysed(simulated, tmp_path, rng):
 
 
 def columns_of(figure):
-    """Return the left ends of the panels that are not colour bars."""
+    """Return the left ends of the panels, except colour bars."""
     spots = [axes.get_subplotspec() for axes in figure.axes]
     return {round(spot.get_position(figure).x0, 3) for spot in spots if spot is not None}
 

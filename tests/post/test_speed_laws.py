@@ -11,7 +11,7 @@ from synthetic_run import written
 
 
 def made(rng, count, frames, mass, periodic, keep, fixed):
-    """Return velocities (F, N, 2) of the law with the correlation `keep` between frames."""
+    """Return velocities (F, N, 2) that obey the law, with the correlation `keep` between frames."""
     size = frames + 200, count, 2
     v = lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.normal(size=size), axis=0)[200:]
     v /= np.sqrt(mass)[:, None]
@@ -58,7 +58,7 @@ def test_a_wrong_law_has_a_tiny_p_value(tmp_path, rng):
     """Wrong laws are equal speeds, and a2 = 0.1 as in a gas with white-noise driving."""
     for law, most in (("equal", 1e-12), ("noisy", 1e-4)):
         tests = []
-        for k in range(5):  # in one of them chance may lessen the number of independent speeds
+        for k in range(5):  # chance may reduce the number of independent speeds in one of them
             angle = rng.uniform(0, 2 * np.pi, (20, 500))
             v = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
             if law == "noisy":

@@ -110,7 +110,7 @@ def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, figur
     assert "Equilibrium, many frames" in words_on(figures[0]) and capsys.readouterr().err == ""
     drawn(tmp_path, "speeds", cool)
     assert "No equilibrium" in words_on(figures[1]) and "Equilibrium" not in words_on(figures[1])
-    falls = "kT falls from 0.2362 to 0.06767"  # exp(-0.75) and exp(-2) halves
+    falls = "kT falls from 0.2362 to 0.06767"  # halves of exp(-0.75) and exp(-2)
     printed, said = capsys.readouterr()
     assert falls in words_on(figures[1]) and falls in said and said.count("\n") == 1
     tests = cells(printed)
@@ -147,7 +147,7 @@ def cells(printed):
 
 @pytest.mark.parametrize("drift", [0.0, 0.02])
 def test_a_sheared_gas_is_steady_relative_to_its_flow(tmp_path, rng, capsys, figures, drift):
-    """The kT is 0.5 in a flow with ten times this energy, or with a drift."""
+    """The gas has kT = 0.5 in a flow with ten times this energy, or with a drift."""
     sides = {"periodic": (True, True), "observable_time": np.arange(121.0)}
     box = {"box": {"shear_rate": 10.0}, "contact": {"restitution": 0.9}}
     path = gas(tmp_path / "a.h5", rng, count=1000, frames=121, parameters=box, **sides)
@@ -175,7 +175,7 @@ def test_speeds_of_few_disks_or_at_rest_or_on_sliding_walls_are_refused(tmp_path
 
 
 def words_on(figure):
-    """Return all texts of a figure in one line."""
+    """Return all texts of a figure on one line."""
     parts = [text.get_text() for text in figure.findobj(plt.Text)]
     return " ".join(" ".join(parts).split())
 
@@ -199,7 +199,7 @@ def test_mixture_has_the_means_of_maxwell(tmp_path, rng):
     run = written(tmp_path / "slow.h5", 0 * slow, slow, **parts)
     each = [speed_laws.speed_test([run], [range(400)], name).independent for name in run.names]
     assert 300 < np.mean(each) / 500 * 10 < 700
-    for speed, top in rng.uniform((0.1, 2), (2, 9), (20, 2)):  # a start at one speed
+    for speed, top in rng.uniform((0.1, 2), (2, 9), (20, 2)):  # equal initial speeds
         bins = mixture.speed_bins(np.full(5, speed), top)
         one = np.searchsorted(bins, speed)
         assert bins[one - 1 : one + 1].mean() == pytest.approx(speed) and bins[-1] >= top

@@ -1,4 +1,4 @@
-"""The stage of the player in a browser: disks and obstacles of all sizes can be seen."""
+"""The stage of the player in a browser: disks and obstacles of all sizes are visible."""
 
 import numpy as np
 import pytest
@@ -58,7 +58,7 @@ def test_the_arrows_of_a_film_have_a_scale(playing, tmp_path, rng):
 
 
 def test_many_obstacles_cost_the_same_each_and_keep_their_area(playing, tmp_path, rng):
-    """The law of an obstacle is read a few times per picture, whatever the number of obstacles."""
+    """The law of an obstacle is read a few times per picture, however many obstacles there are."""
     count, radius, x = 20_000, 3e-4, np.full((2, 1, 2), 0.5)
     rounds = [((*centre,), radius, False) for centre in rng.uniform(0, 1, (count, 2)).tolist()]
     path = still_run(tmp_path / "a.h5", x, radius=1e-3, obstacles=rounds, periodic=(True, True))

@@ -1,4 +1,4 @@
-"""Means, errors and tests of post/ for samples of known distributions: coverage is correct."""
+"""Means, errors and tests for samples of known distributions: the coverage is correct."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from ricochet.predictions.hard_disks import haff_rate
 
 
 def remembering(rng, length: int, memory: float) -> np.ndarray:
-    """A series (T,) of mean 0 and variance 1 whose correlation falls by 1/e in `memory` samples."""
+    """Return a series (T,) with mean 0, variance 1 and correlation time `memory`, in samples."""
     keep = np.exp(-1 / memory)
     return lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.normal(size=length + 2000))[2000:]
 
@@ -31,7 +31,7 @@ def test_maxwell_sample_is_accepted_and_a_wrong_temperature_rejected(rng):
 
 @pytest.mark.parametrize("periodic", [False, True])
 def test_finite_n_law_is_that_of_disks_sharing_an_energy(rng, periodic):
-    """In a periodic box the centre of mass is at rest; copies of a value are counted once."""
+    """In a periodic box the centre of mass is at rest; copies of a value count once."""
     v = rng.normal(size=(40000, 5, 2))
     v -= periodic * v.mean(axis=1, keepdims=True)
     k = np.sum(v**2, axis=2)
@@ -99,7 +99,7 @@ def test_68_of_100_exponents_hold_the_true_one_where_scatter_makes_the_error(rng
 
 @pytest.mark.parametrize(("points", "runs"), [(3, 2), (3, 4), (5, 4), (10, 8), (20, 4)])
 def test_68_of_100_exponents_hold_the_true_one_where_runs_make_the_errors(rng, points, runs):
-    """The errors of the points, the largest four times the smallest, are found from few runs."""
+    """The errors of the points, estimated from few runs, differ by up to a factor of four."""
     x, held = np.linspace(1, 30, points), []
     spread = np.geomspace(0.05, 0.0125, points)
     for _ in range(1000):
@@ -210,7 +210,7 @@ def test_a_propagated_error_belongs_to_the_value_at_the_mean():
 
 
 def test_the_end_of_the_homogeneous_state_is_that_of_the_mean_rate():
-    """The printed number is the place from which the curves of the figure are pale."""
+    """At the printed number the curves in the figure become pale."""
     tau = np.linspace(0, 40, 401)
     tracks = []
     for factor in (0.925, 0.975, 1.025, 1.075):

@@ -1,4 +1,4 @@
-"""The stream function: differences of psi are numbers of disks that pass per time."""
+"""The stream function: differences of psi are numbers of disks passing per time."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -17,7 +17,7 @@ GRIDS = ((3, 4), (7, 7), (16, 24))
 
 @pytest.mark.parametrize("periodic", [(False, False), (True, False), (False, True), (True, True)])
 def test_a_stream_function_is_found_from_its_flux(rng, periodic):
-    """Random modes that satisfy the boundary conditions, with a flux along periodic axes."""
+    """Random modes satisfy the boundary conditions, with a flux along periodic axes."""
     edges = rng.uniform(0.5, 3, 2)
     count = tuple(map(int, rng.integers(30, 45, 2)))
     ends = [np.linspace(0, edge, n + 1) for edge, n in zip(edges, count, strict=True)]
@@ -44,7 +44,7 @@ def test_a_stream_function_is_found_from_its_flux(rng, periodic):
 
 
 def in_a_strip(rng) -> tuple[np.ndarray, np.ndarray, Callable]:
-    """Sample disks between two walls along x that move at 1; psi grows over the accessible part."""
+    """Sample disks moving at 1 between two walls along x; psi grows over the accessible part."""
     x = rng.uniform([0, RADIUS], [1, 1 - RADIUS], (FRAMES, COUNT, 2))
     return x, np.broadcast_to([1.0, 0.0], x.shape), lambda x, y: COUNT * share(y)
 
@@ -64,7 +64,7 @@ def in_a_funnel(rng) -> tuple[np.ndarray, np.ndarray, Callable]:
 
 
 def in_a_drum(rng) -> tuple[np.ndarray, np.ndarray, Callable]:
-    """Sample disks that rotate rigidly in a round container of radius 0.5 with the rate 1."""
+    """Sample disks rotating rigidly at the rate 1 in a round container of radius 0.5."""
     most, angle = 0.5 - RADIUS, rng.uniform(0, 2 * np.pi, (FRAMES, COUNT))
     r = most * np.sqrt(rng.uniform(0, 1, angle.shape))
     x = np.stack([r * np.cos(angle), r * np.sin(angle)], axis=-1)
@@ -78,7 +78,7 @@ def in_a_drum(rng) -> tuple[np.ndarray, np.ndarray, Callable]:
 
 
 def share(y: np.ndarray) -> np.ndarray:
-    """Return the share of the width that centres can reach below a height."""
+    """Return the fraction of the accessible width that is below a height."""
     return np.clip((y - RADIUS) / (1 - 2 * RADIUS), 0, 1)
 
 
@@ -91,7 +91,7 @@ SYSTEMS = {
 
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_differences_of_psi_are_fluxes_on_every_grid(tmp_path, rng, system):
-    """Psi at the corners and in the middles of cells is exact within its error, near walls too."""
+    """Psi at corners and midpoints of cells is correct within its error, even near walls."""
     sample, periodic, obstacles = SYSTEMS[system]
     pulls = []
     for seed in range(2 * len(GRIDS)):
@@ -114,7 +114,7 @@ def test_differences_of_psi_are_fluxes_on_every_grid(tmp_path, rng, system):
 
 
 def test_recycled_disks_have_no_stream_function(tmp_path, rng, capsys):
-    """The script draws the arrows of a refilled hopper, and says why it draws no streamlines."""
+    """The script draws the arrows of a refilled hopper, and says why there are no streamlines."""
     x, v, _ = in_a_funnel(rng)
     parameters = {"drive": {"kind": "recycle"}}
     path = write_run(tmp_path / "a.h5", x, v, radius=RADIUS, parameters=parameters)

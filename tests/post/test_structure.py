@@ -44,7 +44,7 @@ def test_points_at_random_are_not_correlated(tmp_path, rng, periodic):
 
 
 def test_pairs_are_counted_in_the_box_of_the_moment(tmp_path, rng):
-    """A side compresses the disks; frames without disks far from walls have no result."""
+    """A side compresses the disks; frames without disks far from walls yield no result."""
     time, stroke = (
         np.arange(60.0),
         {"motion": "constant_velocity", "velocity": 0.01, "start_time": 0.0, "end_time": 50.0},
@@ -74,7 +74,7 @@ def test_the_structure_factor_of_points_at_random_is_1_of_a_lattice_n(tmp_path, 
     x, sides = triangular(12, 14)
     lattice = written(tmp_path / "c.h5", [x], [x], edges=sides, periodic=PERIODIC, radius=0.5)
     monkeypatch.undo()
-    first = 4 * np.pi / np.sqrt(3)  # Bragg's peak, six wave vectors
+    first = 4 * np.pi / np.sqrt(3)  # Bragg peak, six wave vectors
     edges = first + np.array([-0.3, -0.01, 0.01])
     between, peak = structure.structure_factor(lattice, [0], edges)
     assert between == pytest.approx(0, abs=1e-9) and peak == pytest.approx(len(x))
@@ -109,7 +109,7 @@ def test_partial_structures_are_those_of_each_pair_of_species_and_add_up(tmp_pat
         ideal = 1.0 if of is structure.pair_correlation else np.eye(2)[..., None]
         np.testing.assert_allclose(part - ideal, 0, atol=0.1)
         weight = np.sqrt(np.outer(share, share))[..., None]
-        if of is structure.pair_correlation:  # N N' - N pairs, where N (N' - 1) were counted
+        if of is structure.pair_correlation:  # N N' - N pairs, of which N (N' - 1) were counted
             counts = 500 * share
             weight = np.outer(counts, counts) - np.diag(counts)
             weight = weight[..., None] / (500 * 499)
@@ -117,7 +117,7 @@ def test_partial_structures_are_those_of_each_pair_of_species_and_add_up(tmp_pat
 
 
 def test_the_structure_of_one_run_knows_that_its_frames_remember(tmp_path, rng):
-    """Two configurations, each for half of the time, are equivalent to two independent frames."""
+    """Two configurations, each lasting half of the time, count as two independent frames."""
     places = rng.uniform(size=(2, 200, 2))
     run = written(tmp_path / "run.h5", *[np.repeat(places, 16, axis=0)] * 2, periodic=PERIODIC)
     parts = [slice(0, 16), slice(16, 32), slice(0, 32)]
@@ -178,7 +178,7 @@ def test_a_cluster_hangs_together_across_a_periodic_side_and_not_across_a_wall(t
 def flights(rng, count, time):
     """Return positions and velocities (T, count, 2) of points with velocity changes at rate 1.
 
-    Each component is normal with variance 1, so that <v(0) v(t)> / 2 = D'(t) = exp(-t).
+    Each component is Gaussian with variance 1, so that <v(0) v(t)> / 2 = D'(t) = exp(-t).
     """
     x, v = np.empty((2, len(time), count, 2))
     for k in range(count):
@@ -262,7 +262,7 @@ def test_each_lag_is_exact_whenever_frames_are(tmp_path, rng, times):
 
 
 def test_a_correlator_keeps_few_samples_and_looks_at_many_lags(tmp_path, rng, monkeypatch):
-    """It finds all lags of very many times by testing a part of the pairs."""
+    """It finds all lags of very many times by testing some of the pairs."""
     monkeypatch.setattr(pairs, "MOST_DISKS", 0)  # as for runs with very many pairs
     x = rng.uniform(size=(4000, 3, 2))
     run = written(tmp_path / "run.h5", x, x, time=np.arange(4000.0))
@@ -277,7 +277,7 @@ def test_a_correlator_keeps_few_samples_and_looks_at_many_lags(tmp_path, rng, mo
 
 
 def test_lags_with_few_pairs_beside_lags_with_many_are_left_out():
-    """Frames at powers of ten have one pair at each lag, frames at equal intervals have many."""
+    """Frames at powers of ten have one pair at each lag, equally spaced frames have many."""
     decades = np.append(0, np.geomspace(0.001, 100, 51))
     lags = pairs.lags_of(np.unique(np.round(np.append(decades, np.arange(1, 101.0)), 9)))
     assert sum(lags < 1) > 25 and np.all(lags[lags > 1] % 1 == 0)
@@ -329,7 +329,7 @@ def test_the_table_contains_the_diffusion_of_each_species(simulated, monkeypatch
 
 @pytest.mark.parametrize("side", ["periodic", "wall"])
 def test_what_is_found_on_the_fly_and_in_parts_is_that_of_the_file(simulated, tmp_path, side):
-    """Results are bit-identical: in one pass, for a growing file, and after stop and resume."""
+    """Results are bit-identical in one pass, for a growing file, and after stop and resume."""
     texts = [MIXED.format(seed=1, packing=0.2, until=until) for until in (0.5, 1.01)]
     texts = [text.replace("periodic", side) for text in texts]
     short, run = (simulated(text, name=f"{k}") for k, text in enumerate(texts))
@@ -351,7 +351,7 @@ def test_what_is_found_on_the_fly_and_in_parts_is_that_of_the_file(simulated, tm
 
 
 def test_the_figure_of_a_mixture_names_all_curves_and_marks_those_without_error(simulated):
-    """A single run has no error of long lags.  Its curves of species differ by colour.
+    """A single run has no error at long lags; its curves of species differ in colour.
 
     The structure is calculated for all pairs of species.
     """
@@ -375,7 +375,7 @@ def test_the_figure_of_a_mixture_names_all_curves_and_marks_those_without_error(
 
 @STATISTICS
 def test_disks_that_differ_by_their_mass_alone_have_the_structure_of_equal_ones(simulated):
-    """Contact g follows from the pressure, S at small k from the compressibility 1 / (eta Z)'."""
+    """The pressure determines g at contact, the compressibility 1 / (eta Z)' S at small k."""
     run = simulated(MIXED.format(seed=1, packing=0.1, until=10))
     eta, near, far = 0.2, np.array([1, 1.02]), np.array([0.01, 0.5])
     frames = [structure.evenly(run, most=200)]

@@ -19,7 +19,7 @@ from validation.estimators import force, hit_rate
 
 
 def steady(path, periodic, speed=1.0, radius=0.01, **parameters):
-    """Write a run of 100 disks with kT = 2 speed^2; cumulative observables grow linearly."""
+    """Write a run of 100 disks with kT = 2 speed^2 and linearly growing cumulative observables."""
     time = np.arange(201.0)
     v = speed * np.tile([[2.0, 0.0], [-2.0, 0.0]], (1, 50, 1)).repeat(2, axis=0)
     observables = {
@@ -119,19 +119,19 @@ KICKS = {
 
 
 class DrawnGas(NamedTuple):
-    """A gas with random features (heated, driven, rough, ...), and its known properties."""
+    """Gas with random traits (heated, driven, rough, ...), and its known properties."""
 
     text: str
     plain: str  # equal masses, smooth, elastic and undriven, with the same Z
     settles: bool  # whether it reaches equilibrium
     fluid: bool  # whether its pressure is uniform
     rough: bool
-    kept: np.ndarray  # (2,) axes along which the momentum is kept, if nothing heats
-    kt: float | None  # of what heats
+    kept: np.ndarray  # (2,) axes along which the momentum is conserved, if nothing heats
+    kt: float | None  # of the heat bath
 
 
 def drawn_gas(rng) -> DrawnGas:
-    """Return a gas of two species in a random kind of box, with random features."""
+    """Return a gas of two species in a random kind of box, with random traits."""
     maybe = lambda share: bool(rng.random() < share)  # noqa: E731
     sides, count = rng.choice(["wall", "periodic"], 2), rng.integers(12, 30, 2)
     radius, mass = np.array([1.0, rng.choice([1.0, 1.5])]), rng.choice([1.0, 3.0, 10.0], 2)
@@ -188,10 +188,10 @@ def drawn_gas(rng) -> DrawnGas:
 
 
 def chance_of(off, *means):
-    """The probability that the difference of means is larger than `off`, by Student's law.
+    """Return the probability by Student's law that the difference of means exceeds `off`.
 
-    An error from a few slow waves has few degrees of freedom, which are combined as by Welch and
-    Satterthwaite.  An exact value has no error.
+    An error from a few slow waves has few degrees of freedom, which are combined according to Welch
+    and Satterthwaite. An exact value has no error.
     """
     known = [one for one in means if isinstance(one, statistics.SeriesMean) and one.error > 0]
     if not known:
@@ -204,7 +204,7 @@ def chance_of(off, *means):
 
 @pytest.mark.parametrize("systems", [12, pytest.param(400, marks=pytest.mark.check)])
 def test_kt_and_z_of_any_gas_are_right_or_refused(simulated, systems):
-    """The kT is that of walls or driving, or follows from the energy; Z is of the undriven gas."""
+    """The kT is that of walls or driving, or given by the energy; Z is that of the undriven gas."""
     found = []
     for k in range(systems):
         known = drawn_gas(np.random.default_rng([int(os.environ.get("SEED", "1")), k]))

@@ -58,7 +58,7 @@ def test_moments_are_those_of_the_definition(gas):
 
 
 def test_all_that_changes_velocities_counts_in_what_is_carried(gas):
-    """With driving, thermal and moving walls and losses, the moment is the integral of the flux."""
+    """With driving, moving and thermal walls and dissipation, the moment integrates the flux."""
     driven = {
         "sides": "'wall', 'periodic' / &side name = 'left' temperature = 3 / "
         "&side name = 'right' motion = 'sine' amplitude = 0.02 period = 0.1 / "
@@ -108,7 +108,7 @@ def test_fluxes_that_forget_have_the_coefficient_and_the_errors_they_should(samp
 
 @STATISTICS
 def test_errors_of_coefficients_of_short_runs_are_their_scatter():
-    """This test takes 1200 short series; a tenth of them would not show an error of 10 %."""
+    """This takes 1200 short series; a tenth of them would not reveal an error of 10 %."""
     rng, keep = np.random.default_rng(4), np.exp(-1 / 6)
     truth = (1 + keep) / (1 - keep) / 2
     few = [tp.coefficient(fluctuating(rng, 1400, 6.0), 1.0, 100) for _ in range(1200)]
