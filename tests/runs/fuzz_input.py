@@ -1,10 +1,10 @@
-"""Run the program with thousands of damaged input files and check its reactions.
-
-For every input file, --check must end within seconds with the exit status 0 or 2 and without a
-backtrace.  If the file is refused, all messages must name the file.  If the file is accepted, the
-output of --print-input must not change when it is written to a new input file and read again.
+"""Run the program with thousands of damaged input files, and check its reactions.
 
     python tests/runs/fuzz_input.py --count 10000 --program build/ricochet
+
+For every input file, --check must end within seconds with the exit status 0 or 2 and without a
+backtrace. If a file is refused, all messages must name it. If it is accepted, the output of
+--print-input must not change when it is written to a new input file and read again.
 """
 
 import argparse
@@ -173,7 +173,7 @@ def printed(program: str, path: Path) -> list[tuple[str, dict]]:
 
 
 def cases(count: int, seed: int):
-    """Yield damaged input files; every tenth file consists of random bytes."""
+    """Yield damaged input files, every tenth of them random bytes."""
     for number in range(count):
         rng = random.Random(f"{seed} {number}")
         if number % 10 == 9:
@@ -183,7 +183,7 @@ def cases(count: int, seed: int):
 
 
 def fuzz(program: str, count: int, seed: int) -> Counter:
-    """Return how often each verdict occurred, and print files with faults to stderr."""
+    """Return how often each verdict occurred, and print faulty files to stderr."""
     verdicts: Counter = Counter()
     files = list(cases(count, seed))
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count() or 1) as pool:

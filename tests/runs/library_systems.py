@@ -1,6 +1,6 @@
-"""Systems that the tests of the library simulate."""
+"""Systems simulated by the tests of the library."""
 
-#: A lossy gas of rough disks of two species under gravity.
+#: Dissipative gas of rough disks of two species under gravity.
 GAS = """&box boundary = 'periodic', 'wall' gravity = 0, -1 /
 &species name = 'a' count = 60 radius = 0.02 velocities = 'maxwell' temperature = 1 /
 &species name = 'b' count = 20 radius = 0.04 mass = 3 velocities = 'rest' /
@@ -9,5 +9,5 @@ GAS = """&box boundary = 'periodic', 'wall' gravity = 0, -1 /
 &stop collisions = 400 /
 """
 
-#: Settings with which this gas loses no energy.
+#: Settings with which this gas is elastic.
 ENDLESS = {"contact.restitution": 1, "contact.tangential_restitution": 1}

@@ -29,7 +29,7 @@ LAWS = {
 
 
 def ring(kind: str, law: str, more: str = "", box: str = "") -> str:
-    """Return disks in or around a ring: a whole circle, or an arc of 360 degrees."""
+    """Return disks in or around a ring, which is a whole circle or an arc of 360 degrees."""
     return f"""&run seed = 3 {more} /
 &box {box} /
 {CIRCLE}{kind}{law} /
@@ -39,7 +39,7 @@ def ring(kind: str, law: str, more: str = "", box: str = "") -> str:
 
 @pytest.mark.parametrize("name", ["stadium", "mushroom"])
 def test_random_starts_lie_inside_the_billiard(name):
-    """Disks that start at random positions of the input never reach the left and right sides."""
+    """Disks starting at random positions of the input never reach the left and right sides."""
     random = {"position": None, "velocity": None, "count": 1, "speed": 1}
     for seed in range(1, 21):
         own = {"run": {"seed": seed}, "species": {"disk": random}}
@@ -59,7 +59,7 @@ def test_random_starts_lie_inside_the_billiard(name):
     ],
 )
 def test_a_closed_arc_is_a_container(law, more, box):
-    """Disks move in an arc of 360 degrees as in a circle with side = 'inside', up to rounding."""
+    """In an arc of 360 degrees disks move as in a circle with side = 'inside', up to rounding."""
     whole, arc = (
         Simulation(ring(kind, LAWS[law], more, box))
         for kind in (" side = 'inside'", " from_angle = -70 to_angle = 290")
@@ -92,7 +92,7 @@ def test_a_closed_arc_is_a_peg(law, box):
 
 
 def towards_the_middle() -> str:
-    """Return positions of 12 disks on a circle, and velocities about towards the middle."""
+    """Return positions of 12 disks on a circle, with velocities roughly towards its centre."""
     angles = np.arange(12) * pi / 6
     places = 0.35 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     velocities = -3 * places + np.random.default_rng(2).uniform(-0.3, 0.3, places.shape)
@@ -101,7 +101,7 @@ def towards_the_middle() -> str:
 
 
 def test_a_regular_path_in_a_mushroom_stays_in_the_cap():
-    """The angular momentum is 0.552, which exceeds half the width of the stem, and is conserved."""
+    """The angular momentum is conserved; it is 0.552, more than half the width of the stem."""
     with Simulation(INPUTS / "mushroom.nml") as run:
         found = []
         for events in range(100, 2001, 100):
@@ -112,7 +112,7 @@ def test_a_regular_path_in_a_mushroom_stays_in_the_cap():
 
 
 def test_a_belt_on_an_arc_moves_counter_clockwise_on_both_faces():
-    """A rough disk at rest relative to the floor is driven along the belt of an arc."""
+    """A rough disk, initially at rest relative to the floor, is driven along the belt of an arc."""
     for y, way in ((0.44, 1), (0.56, -1)):  # under the arc at the bottom, and above it
         text = f"""&box upper = 1, 2 /
 &obstacle centre = 0.5, 1 radius = 0.5 from_angle = 250 to_angle = 290
@@ -163,7 +163,7 @@ def test_arcs_of_a_file_are_met_as_if_each_had_a_group(program, tmp_path):
 
 
 def test_the_area_beside_an_arc_is_not_accessible(program, tmp_path):
-    """The centres of disks cannot reach a ring sector with round ends."""
+    """Disk centres cannot reach a ring sector with round ends."""
     text = """&obstacle centre = 0.5, 0.5 radius = 0.3 from_angle = 20 to_angle = 200 /
 &species radius = 0.05 position = 0.5, 0.2 velocity = 0, 1 /
 &stop events = 5 /"""
@@ -201,7 +201,7 @@ def test_too_many_groups_are_refused_in_one_line(program, tmp_path, group):
 
 @pytest.mark.parametrize("angles", [{"from_angle": 17, "to_angle": 287}, {"side": "inside"}])
 def test_a_disk_that_loses_its_normal_velocity_stays_inside(angles):
-    """A disk that moves along a concave face collides again at once and does not pass the face."""
+    """A disk moving along a concave face collides again at once and does not pass the face."""
     rng = np.random.default_rng(1)
     bowl = {"centre": [0.5, 0.5], "radius": 0.4, "restitution": 0, "rule": "normal"} | angles
     for _ in range(300):

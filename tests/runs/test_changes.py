@@ -1,14 +1,14 @@
-"""Changes of a running simulation: it continues exactly like a simulation loaded from a file.
+"""Changes of a running simulation, which continues exactly like one loaded from a file.
 
-Each test advances a random system and changes it at random times.  The changes concern gravity, the
-collision rules and motions of all boundaries, the driving, the contact law and the velocities.  The
-first simulation of a system also attempts invalid changes, and changes to equal values, which must
-have no effect.  Two further simulations advance to the same times in other steps, on several
-threads, with another search and event queue, and are saved and loaded between changes.  The program
-continues the last saved file.  All final states must be bit-identical.
+Each test advances a random system and changes it at random times: gravity, the collision rules and
+motions of all boundaries, the driving, the contact law and the velocities. The first simulation of
+a system also attempts invalid changes, and changes to equal values, which must have no effect. Two
+further simulations advance to the same times in different steps, on several threads, with another
+search and event queue, and are saved and loaded between changes. The program continues the last
+saved file. All final states must be bit-identical.
 
 The environment variables SYSTEMS and SEED set the number of systems and the seed, for example
-`SYSTEMS=300 SEED=20270131`.  `make check` uses another seed every day.
+`SYSTEMS=300 SEED=20270131`. `make check` uses a new seed every day.
 """
 
 import os
@@ -32,7 +32,7 @@ KEPT = 8  #: number of systems in `make test`
 SEEDS = [f"{os.environ.get('SEED', '1')} change {k}" for k in range(COUNT)]
 MOST_DISKS = 300
 MOST_EVENTS, MOST_STEPS, MOST_KICKS = 600, 300, 30  #: between two changes
-DEEPEST = 1e-12  #: overlap, of the larger of diameter and box
+DEEPEST = 1e-12  #: largest overlap, relative to the larger of diameter and box
 LAW = (
     "restitution",
     "rule",
@@ -56,7 +56,7 @@ MEMORY += "|&source|&change|waiting =|open ="
 
 
 class Change(NamedTuple):
-    """A change of a simulation: settings GROUP.VARIABLE=VALUE, or velocities of all disks."""
+    """Change of a simulation: settings GROUP.VARIABLE=VALUE, or velocities of all disks."""
 
     settings: list[str]
     velocity: np.ndarray | None = None
@@ -70,13 +70,13 @@ class Change(NamedTuple):
 
 
 def settings(group: str, words: str, reset: tuple[str, ...] = ()) -> list[str]:
-    """Return settings GROUP.VARIABLE=VALUE, where the variables in `reset` have default values."""
+    """Return settings GROUP.VARIABLE=VALUE, with default values for the variables in `reset`."""
     values = dict(re.findall(r"(\w+) = ('\w+'|[^ ,]+(?:, [^ ,]+)*)", words))
     return [f"{group}.{name}={values.get(name, '')}" for name in {**dict.fromkeys(reset), **values}]
 
 
 def drawn_change(simulation: Simulation, draw: Draw) -> Change:
-    """Return a random change that is valid for the initial system but may be refused later."""
+    """Return a random change that is valid for the initial system, but may be refused later."""
     rng = draw.rng
     walls = {name.rpartition(".")[0] for name in simulation._values()}
     walls = sorted(wall for wall in walls if wall.startswith(("obstacle.", "wall.")))
@@ -111,9 +111,9 @@ def drawn_change(simulation: Simulation, draw: Draw) -> Change:
 
 
 def drawn_velocity(simulation: Simulation, draw: Draw) -> np.ndarray:
-    """Return new random velocities, which may depend on the present velocities."""
+    """Return new random velocities, which may depend on the present ones."""
     rng, velocity = draw.rng, simulation.velocity
-    if draw.chance(0.25):  # velocities of disks outside are NaN, and have no effect
+    if draw.chance(0.25):  # NaN velocities of disks outside have no effect
         return np.where(np.isfinite(velocity[::-1]), velocity[::-1], 0)
     if draw.chance(0.3):
         speed = rng.choice([0, draw.speed, draw.speed * 10.0 ** rng.randint(-9, 9)])
@@ -123,25 +123,26 @@ def drawn_velocity(simulation: Simulation, draw: Draw) -> np.ndarray:
 
 
 class Course:
-    """A simulation of a random system, with a record of its changes for repetitions."""
+    """Simulation of a random system, with a record of its changes for repetitions."""
 
     def __init__(self, program: Path, seed: str):
-        """Draw a random system, and write its input file into a folder."""
+        """Draw a random system, and write its input file to a folder."""
         self.program, self.rng = program, random.Random(seed)
         system = accepted(program, Path(), self.rng, most=MOST_DISKS)
         self.draw, self.steps = system.draw, "'steps'" in system.text
         text = re.sub(r"^&stop.*$", "&stop events = 1000000000 /", system.text, flags=re.MULTILINE)
         text = re.sub(r"^&output.*$", "&output /", text, flags=re.MULTILINE)
         Path("case.nml").write_text(text)
-        self.moments: list[tuple[dict, float]] = []  #: arguments of `advance`, and the time then
-        self.changes: list[tuple[int, Change]] = []  #: after how many of them, and what
-        self.message = ""  #: with which it broke off
+        self.moments: list[tuple[dict, float]] = []  #: arguments of `advance`, and the time reached
+        #: number of these moments before a change, and the change
+        self.changes: list[tuple[int, Change]] = []
+        self.message = ""  #: message with which it aborted
         self.faults: list[str] = []
         self.samples: dict[str, list] = {name: [] for name in SAMPLED}
-        self.found: dict = {}  #: all that files of it have said
+        self.found: dict = {}  #: contents of all its files
 
     def next_moment(self, simulation: Simulation) -> dict:
-        """Return when the next change occurs: after a number of events, or at a time."""
+        """Return when the next change occurs, after a number of events or at a time."""
         rng, draw = self.rng, self.draw
         speed = float(np.nan_to_num(simulation.observable("all/mean_speed"))) or draw.speed
         if draw.sheared:
@@ -162,7 +163,7 @@ class Course:
         self.moments[-1] = moment, simulation.time
 
     def run(self) -> Simulation:
-        """Perform the first simulation, which all further simulations repeat."""
+        """Execute the first simulation, which all others repeat."""
         simulation = Simulation("case.nml")
         self.look(simulation)
         try:
@@ -198,7 +199,7 @@ class Course:
             self.change_nothing(simulation)
 
     def change_nothing(self, simulation: Simulation) -> None:
-        """Apply a change in which all values remain the same."""
+        """Apply a change that leaves all values the same."""
         before, known = facts(simulation), (simulation.changes, simulation.input)
         if self.rng.random() < 0.3:
             simulation.velocity = simulation.velocity
@@ -215,7 +216,7 @@ class Course:
         """Record the energies, and determine the largest overlap of disks."""
         observed = simulation._observed()
         for name, values in self.samples.items():
-            if name in observed or name != "inside":  # which closed systems lack
+            if name in observed or name != "inside":  # missing in closed systems
                 values.append(float(observed[name][0]) if name in observed else 0.0)
         simulation.save("look.h5", force=True)
         self.found |= (found := contents("look.h5.part"))
@@ -242,7 +243,7 @@ class Course:
             self.faults.append(f"energy: {part:g} times what is allowed")
 
     def repeat(self, name: str) -> Simulation:
-        """Repeat the simulation with other steps and methods, and with saving and loading."""
+        """Repeat the simulation with other steps and methods, saving and loading it."""
         rng, simulation = self.rng, Simulation("case.nml", *self.way())
         for k in range(len(self.moments) + 1):
             if k > 0:
@@ -260,7 +261,7 @@ class Course:
         return simulation
 
     def way(self) -> tuple[dict[str, str], int]:
-        """Return random variables, and a number of threads, that must not change the results."""
+        """Return random variables, and a number of threads, that must not affect the results."""
         searches = ["cells", "pairs", *["rescan"] * (self.draw.disks <= 60)]
         ways = {"run.search": self.rng.choice(searches)}
         if not self.steps:
@@ -294,7 +295,7 @@ class Course:
             self.faults.append(f"the program differs: {different}, times {where}")
 
     def start_from_last_frame(self, simulation: Simulation) -> None:
-        """Check that a run which starts from the last frame has the same first collisions."""
+        """Check that a run starting from the last frame has the same first collisions."""
         text, slowest = simulation.input, np.abs(simulation.velocity)
         if re.search(MEMORY, text) or np.any((slowest > 0) & (slowest < 1e-100)):
             return
@@ -314,7 +315,7 @@ class Course:
         events = zip(simulation.next_events(20), new.next_events(20), strict=False)
         for (time, i, j), (new_time, new_i, new_j) in events:
             if met & {i, j, new_i, new_j} - {0}:
-                break  # what follows depends on rounding
+                break  # later events depend on rounding
             met |= {i, j} if j > 0 else {i}
             if abs(time - begin - new_time) > 1e-6 * new_time + 8 * np.spacing(begin):
                 self.faults.append(f"a new run collides otherwise: {i} {j} at {time} from {begin}")
@@ -322,7 +323,7 @@ class Course:
 
 
 def kept(simulation: Simulation, name: str) -> Simulation:
-    """Save and load a simulation, and return the loaded simulation."""
+    """Save and load a simulation, and return the loaded one."""
     simulation.save(f"{name}.h5", force=True)
     simulation.close()
     return Simulation.load(f"{name}.h5")
@@ -342,7 +343,7 @@ def unlike(one: dict, other: dict) -> list[str]:
 
 
 def without_ways(text: str) -> str:
-    """Return an input text without the variables that must not change the results."""
+    """Return an input text without the variables that must not affect the results."""
     return re.sub(r"  (search|queue) = .*\n", "", text)
 
 
@@ -378,7 +379,7 @@ def test_a_changed_simulation_continues_exactly(program, tmp_path, monkeypatch, 
 
 
 def test_a_change_suppresses_no_collision():
-    """After the change two disks collide again across periodic sides, at the time of the change."""
+    """After the change, and at the same time, two disks collide again across periodic sides."""
     gas = Simulation(
         """&box boundary = 'periodic', 'periodic' /
         &species name = 'a' radius = 0.1 position = 0.3, 0.5, 0.7, 0.5 velocity = 1, 0, 0, 0 /"""
@@ -391,7 +392,7 @@ def test_a_change_suppresses_no_collision():
 
 @pytest.mark.parametrize("pull", [-1e35, -1e50, -1e90])
 def test_extreme_accelerations_leave_the_caller_in_control(pull):
-    """`advance` returns after a limited time even if disks are accelerated extremely."""
+    """`advance` returns after a limited time even for extremely accelerated disks."""
     script = f"""
 from ricochet import Simulation
 disks = {{"count": 50, "packing_fraction": 0.1, "speed": 1}}
@@ -404,7 +405,7 @@ assert gas._go_on((1.0, 2**62, 2**62), 0.05) and gas.events > events"""
 
 @pytest.mark.parametrize("factor", [1e-3, 1e-9, 1e-11])
 def test_a_gas_that_was_slow_for_long_is_exact_when_it_is_fast_again(factor):
-    """Overlaps are not larger than rounding errors, because times are relative to the change."""
+    """Overlaps stay within rounding errors, because times are relative to the change."""
     disks = {"count": 50, "packing_fraction": 0.2, "speed": 1}
     gas = Simulation({"species": disks}).advance(time=0.5)
     gas.velocity = factor * gas.velocity
@@ -423,7 +424,7 @@ def test_a_gas_that_was_slow_for_long_is_exact_when_it_is_fast_again(factor):
 )
 @pytest.mark.parametrize("speed", [1e-6, 1e-12])
 def test_slow_disks_that_an_event_makes_fast_are_exact(group, speed):
-    """A hot or moving boundary, or friction of fast rotating disks, makes slow disks fast."""
+    """A hot or moving boundary, or friction with fast rotating disks, accelerates slow disks."""
     disks = {"count": 50, "packing_fraction": 0.1, "speed": speed, "angular_velocity": 30}
     gas = Simulation({"species": disks, **group})
     while np.abs(gas.velocity).max() < 1e3 * speed:
@@ -442,7 +443,7 @@ def test_slow_disks_that_an_event_makes_fast_are_exact(group, speed):
 )
 @pytest.mark.parametrize("speed", [1e-6, 1e-12])
 def test_slow_disks_that_a_kick_makes_fast_are_exact(drive, speed):
-    """A kick after a long time of slow motion makes disks fast."""
+    """A kick accelerates disks after a long time of slow motion."""
     drive = {"interval": 1 / speed, **drive}
     if drive["kind"] == "noise":
         drive["strength"] = speed  # each kick then adds the variance 1
@@ -455,7 +456,7 @@ def test_slow_disks_that_a_kick_makes_fast_are_exact(drive, speed):
 
 
 def deepest_overlap(gas: Simulation, events: int) -> float:
-    """Return the largest overlap of two disks of equal size during a number of events."""
+    """Return the largest overlap of two equal disks during a number of events."""
     deepest, (one, other) = 0.0, np.triu_indices(gas.n_disks, 1)
     for _ in range(events):
         gas.advance(events=gas.events + 1)
@@ -467,8 +468,8 @@ def deepest_overlap(gas: Simulation, events: int) -> float:
 @pytest.mark.parametrize(
     ("act", "reached"),
     [
-        (lambda gas: setattr(gas, "velocity", 0 * gas.velocity), True),  # waits for its end
-        (lambda gas: setattr(gas, "velocity", 1e-14 * gas.velocity), True),  # is not cold yet
+        (lambda gas: setattr(gas, "velocity", 0 * gas.velocity), True),  # waits until it ends
+        (lambda gas: setattr(gas, "velocity", 1e-14 * gas.velocity), True),  # not cold yet
         (lambda gas: gas.change({"contact.restitution": 1}), True),
         (lambda _: None, False),
     ],
@@ -491,7 +492,7 @@ def test_a_cold_gas_ends_at_the_same_time_in_memory_and_by_the_program(
 
 
 def test_a_piston_without_force_does_work():
-    """Disks transfer energy to the piston, and the piston transfers energy to other disks."""
+    """Disks transfer energy to the piston, and the piston to other disks."""
     disks = {"name": "a", "count": 30, "packing_fraction": 0.1, "speed": 1}
     piston = {"name": "right", "motion": "piston", "mass": 10, "force": 0}
     gas = Simulation({"species": disks, "side": piston}).advance(events=300)
@@ -500,7 +501,7 @@ def test_a_piston_without_force_does_work():
 
 
 def test_a_held_piston_is_released_where_it_is_and_held_there():
-    """A piston can be stopped and released at any time; the saved input contains its position."""
+    """A piston can be stopped and released at any time; the saved input gives its position."""
     disks = {"name": "a", "count": 30, "packing_fraction": 0.1, "speed": 1}
     gas = Simulation({"species": disks}).advance(time=0.5)
     gas.change({"side.right.motion": "piston", "side.right.mass": 20, "side.right.force": 25})
@@ -530,7 +531,7 @@ def test_a_changed_simulation_whose_start_would_not_fit_is_saved(program, tmp_pa
 
 
 def test_a_piston_pushes_disks_beyond_the_opposite_side_of_the_box():
-    """Gravity pulls the disks to the right, and the left piston follows and overtakes them."""
+    """Gravity pulls the disks to the right; the left piston follows and overtakes them."""
     disks = {"name": "a", "count": 100, "packing_fraction": 0.1, "speed": 1}
     pistons = [
         {"name": "left", "motion": "piston", "mass": 10, "force": 50},

@@ -1,7 +1,7 @@
-"""Inelastic collapse: the report of the program against a calculation with 600 digits.
+"""Inelastic collapse: the report of the program, compared with a calculation with 600 digits.
 
-The random systems are rows of two to eight disks, free, at a wall or nearly straight in the plane,
-with equal or unequal masses and with a common velocity; and nearly straight rows of rough disks.
+The random systems are rows of two to eight disks (free, at a wall, or nearly straight in the plane)
+with equal or unequal masses and a common velocity, and nearly straight rows of rough disks.
 """
 
 import os
@@ -17,7 +17,7 @@ from whole_runs import FINISHED, STOPPED, differences, write_input
 
 RADIUS = 0.0625
 KINDS = ("row", "wall", "plane", "masses")
-#: Stable limit of the collapse of three disks in the plane (Zhou and Kadanoff 1996).
+#: Stability limit of the collapse of three disks in the plane (Zhou and Kadanoff 1996).
 PLANE_LIMIT = 0.0557
 NEVER = Decimal("Infinity")
 COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet", "--force"]
@@ -29,12 +29,12 @@ def limit(disks: int, walls: int) -> float:
 
 
 class System:
-    """A random row of disks that approach each other."""
+    """Random row of disks approaching each other."""
 
     tangential, friction, precision, height = -1.0, None, 600, 1.0
 
     def __init__(self, seed: int):
-        """Draw the system with the given seed."""
+        """Draw the system with a given seed."""
         self.rng = rng = np.random.default_rng(seed)
         self.kind = KINDS[seed % len(KINDS)]
         self.disks = 3 if self.kind == "plane" else int(rng.integers(2 + (self.kind != "wall"), 9))
@@ -83,19 +83,19 @@ class System:
         return text
 
     def collapses(self, factor: float = 1) -> bool:
-        """Return whether the collisions never end, by a calculation with hundreds of digits.
+        """Return whether the collisions never end, according to hundreds of digits.
 
-        All coefficients of restitution are multiplied by the factor, up to 1. The relative
-        velocities of a collapse have decreased by 100 powers of ten, or there have been 2500
-        collisions. Gaps decrease faster than relative velocities: with 200 digits, rounding errors
-        determine the last gaps.
+        All coefficients of restitution are multiplied by `factor`, up to 1. A collapse is assumed
+        once the relative velocities have fallen by 100 powers of ten, or after 2500 collisions.
+        Gaps decrease faster than relative velocities: with 200 digits, rounding errors determine
+        the last gaps.
         """
         with localcontext() as context:
             context.prec = self.precision
             return self._goes_on(Decimal(factor))
 
     def is_near_a_limit(self) -> bool:
-        """Return whether a change of all coefficients of restitution by 3 % changes the verdict."""
+        """Return whether changing all coefficients of restitution by 3 % changes the verdict."""
         return len({self.collapses(factor) for factor in (0.97, 1, 1.03)}) > 1
 
     def _goes_on(self, factor: Decimal) -> bool:
@@ -152,12 +152,12 @@ class System:
 
 
 class RoughSystem(System):
-    """A random row of three to five rough disks that is nearly straight."""
+    """Random, nearly straight row of three to five rough disks."""
 
     precision, height = 250, 9.0
 
     def __init__(self, seed: int):
-        """Draw the system with the given seed."""
+        """Draw the system with a given seed."""
         self.rng = rng = np.random.default_rng(seed)
         self.kind = "rough"
         self.disks = n = int(rng.choice([3, 3, 4, 5]))
@@ -187,7 +187,7 @@ def contact_time(x, y, v, w, sigma):
 
 
 def reported(ricochet, folder, text) -> str:
-    """Return the report of a collapse, or an empty text."""
+    """Return the report of a collapse, or ''."""
     write_input(folder, text)
     run = ricochet(*COMMAND)
     said = re.search(r".*collapse.*", run.stdout + run.stderr)
@@ -202,18 +202,18 @@ def test_a_run_reports_exactly_the_collapses(ricochet, tmp_path, seed):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_run_of_rough_disks_reports_exactly_the_collapses(ricochet, tmp_path, seed):
-    """Tangential impulses decide whether rough disks nearly in line collapse."""
+    """Tangential impulses decide whether nearly aligned rough disks collapse."""
     system = RoughSystem(seed)
     assert bool(reported(ricochet, tmp_path, system.text())) == system.collapses()
 
 
 @pytest.mark.check
 def test_many_runs_report_exactly_the_collapses(ricochet, tmp_path):
-    """720 systems, with other seeds if the variable SEED is set, as in `make check`.
+    """720 systems are tested, with other seeds if the variable SEED is set, as in `make check`.
 
-    Systems near a limit of collapse are excluded if the verdicts differ: there, rounding errors can
-    stop the time of a finite series. A few rough systems are excluded elsewhere, but a run that
-    goes on never reports a collapse of them that is none.
+    Systems near a limit of collapse are excluded if the verdicts differ, because rounding errors
+    can stop the time of a finite series there. A few rough systems are excluded elsewhere, but a
+    run that continues never reports a collapse that is none.
     """
     first = 1000 * (1 + int(os.environ.get("SEED", "0")) % 10**6)
     excluded = 0
@@ -295,7 +295,7 @@ def test_the_series_in_a_checkpoint_do_not_depend_on_the_order_in_the_queue(rico
 
 
 def test_a_collapse_that_a_kick_or_a_change_prevents_is_not_reported(ricochet, tmp_path):
-    """A change of the velocities after the first collisions of a collapse ends the collapse."""
+    """Changing the velocities after the first collisions of a collapse ends it."""
     write_input(tmp_path, THREE)
     disks = Simulation(tmp_path / "gas.nml")
     disks.advance(events=18)
@@ -306,7 +306,7 @@ def test_a_collapse_that_a_kick_or_a_change_prevents_is_not_reported(ricochet, t
 
 @pytest.mark.parametrize("restitution", [0.3, 0.8])
 def test_a_long_series_is_stated_in_the_summary(ricochet, tmp_path, restitution):
-    """Two disks between a disk and a wall: collisions without end, which the summary counts."""
+    """The summary counts the endless collisions of two disks between a disk and a wall."""
     write_input(
         tmp_path,
         f"""&box upper = 2, 1 / &contact restitution = {restitution} wall_rule = 'normal' /

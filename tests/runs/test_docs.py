@@ -25,7 +25,7 @@ ELSEWHERE = ("http://", "https://", "mailto:", "#")
 
 
 def path_of(page):
-    """Return the path of a page in the root of the project, or anywhere in docs/."""
+    """Return the path of a page in the root of the project or anywhere in docs/."""
     root = ROOT / f"{page}.md"
     (path,) = [root] if root.exists() else ROOT.glob(f"docs/*/{page}.md")
     return path
@@ -80,7 +80,7 @@ def test_the_queues_on_the_page_are_those_of_the_engine(program):
 
 
 def sections_of(page):
-    """Return the headings of a page in the form that links use."""
+    """Return the headings of a page in the form used by links."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(), re.M)
     return [re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings]
 
@@ -106,7 +106,7 @@ def test_what_a_page_leads_to_and_names_is_there(page):
     ("page", "heading"), [("promises", "## Promises"), ("inside", "## Invariants")]
 )
 def test_promises_are_held_by_tests_and_modules_that_exist(page, heading):
-    """The second column of each table names tests, and the third column modules or scripts."""
+    """The second column of each table names tests, the third modules or scripts."""
     sources = [*ROOT.glob("tests/**/*.py"), *ROOT.glob("tests/**/*.pf")]
     known = re.findall(
         r"^def test_(\w+)|^  subroutine (\w+)", "".join(p.read_text() for p in sources), re.M
@@ -125,14 +125,14 @@ def test_promises_are_held_by_tests_and_modules_that_exist(page, heading):
 
 
 def procedures_of(module):
-    """Return the names of all procedures of a module such as `physics/collisions`."""
+    """Return the names of all procedures in a module such as `physics/collisions`."""
     path = ROOT / "src" / f"{module}.f90"
     code = path.read_text() if path.exists() else ""
     return re.findall(r"^ *(?!end\b)[^!'\"\n]*?\b(?:subroutine|function) +(\w+) *\(", code, re.M)
 
 
 def test_procedures_that_are_named_exist():
-    """Each name `folder/file: procedure` on the page `inside` names a procedure in src/."""
+    """Each name `folder/file: procedure` on the page `inside` is a procedure in src/."""
     page = path_of("inside").read_text()
     named = re.findall(r"`((?:\w+/)?\w+): (\w+)`", page)
     assert len(named) > 30
@@ -193,7 +193,7 @@ def test_procedures_that_are_named_are_called_in_their_examples(tmp_path):
 
 @pytest.mark.parametrize("folder", sorted(p.name for p in ROOT.glob("src/*/")))
 def test_every_folder_introduces_its_modules(folder):
-    """The README of each folder names all modules before the table of their tests."""
+    """The README of each folder names all modules above the table of their tests."""
     page = (ROOT / "src" / folder / "README.md").read_text().split("## Tests")[0]
     modules = [path.stem for path in (ROOT / "src" / folder).glob("*.f90")]
     assert [name for name in modules if not re.search(rf"`{name}\b", page)] == []
@@ -222,7 +222,7 @@ def test_the_numbers_of_the_tasks_are_those_of_their_tables():
 
 @pytest.mark.check
 def test_the_studies_give_the_numbers_of_the_tasks(program, tmp_path, monkeypatch):
-    """The exercises that take less than a minute are repeated, and agree within their errors."""
+    """Exercises that take less than a minute are repeated, and agree within their errors."""
     (tmp_path / "runs").mkdir()
     for script in (ROOT / "runs").glob("*.sh"):
         shutil.copy(script, tmp_path / "runs")
@@ -274,7 +274,7 @@ def test_every_observable_is_on_the_page_on_output():
 
 @pytest.fixture
 def at_work(tmp_path, program, monkeypatch):
-    """Return a new folder that is the working directory, while RICOCHET names the program."""
+    """Return a new folder as working directory, with RICOCHET naming the program."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RICOCHET", str(program))
     return tmp_path
@@ -320,7 +320,7 @@ def test_the_code_that_the_page_on_runs_shows_runs_the_program(at_work, program,
 def test_the_code_on_time_correlations_of_the_page_on_output_works(at_work, program, capfd):
     """The example is executed with two seeds, a tenth of the disks and a fiftieth of the time.
 
-    The start of each of the four runs is a dense packing, which takes most of the time.
+    Each of the four runs starts from a dense packing, which takes most of the time.
     """
     page = section("output", "## Time correlations and structure")
     blocks = [textwrap.dedent(one) for one in re.findall(r"(?:^    .*\n)+", page, re.M)]
@@ -360,7 +360,7 @@ def test_the_code_on_transport_of_the_page_on_output_works(at_work, capfd):
 
 
 def test_there_is_one_version(program):
-    """Program, CHANGELOG and citation file contain the same version and date."""
+    """Program, CHANGELOG and citation file agree in version and date."""
     said = ran(program, "--version", check=True).stdout
     init = (ROOT / "post/ricochet/__init__.py").read_text()  # pip takes it from there
     packaged = re.search(r'^__version__ = "(.*)"$', init, re.M)[1]
@@ -424,7 +424,7 @@ def test_completion_knows_ensembles(program, tmp_path):
 
 
 def test_one_command_installs_what_the_notebook_needs():
-    """The command installs Jupyter, its kernel, and all packages that the cells import."""
+    """It installs Jupyter, its kernel, and all packages that the cells import."""
     wanted = {"ipykernel", "jupyterlab", "pandas"}
     lines = (ROOT / "requirements.txt").read_text().splitlines()
     installed = {line.split("==")[0] for line in lines if re.search(r"==.*#.*\bnotebook\b", line)}
@@ -467,7 +467,7 @@ def test_each_cell_shows_what_it_promises(program, monkeypatch):
 
 
 def shown(cell):
-    """Return the output of a notebook cell as one text."""
+    """Return the output of a notebook cell as a single text."""
     return "\n".join(
         str(output.get("text", "")) + "\n".join(map(str, output.get("data", {}).items()))
         for output in cell.outputs
@@ -475,6 +475,6 @@ def shown(cell):
 
 
 def showing(cells, code):
-    """Return the output of the only notebook cell that contains this code."""
+    """Return the output of the only notebook cell that contains the given code."""
     (found,) = [output for source, output in cells if code in source]
     return found

@@ -1,8 +1,8 @@
 """Special cases of sheared boxes, driving, moving sides and collision rules of walls.
 
-General properties such as bit-identical results and conservation laws are tested with random
-systems in test_random_systems.py.  Physical results for heat baths, noise, active disks, viscosity
-and bouncing disks are tested in tests/validation.
+General properties, such as bit-identical results and conservation laws, are tested with random
+systems in test_random_systems.py; physical results on heat baths, noise, active disks, viscosity
+and bouncing disks in tests/validation.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from whole_runs import BROKEN, FINISHED, contents, one_line, write_input
 
 @pytest.fixture
 def performed(ricochet, tmp_path):
-    """Return a function that performs a run and returns the path of its output and its messages."""
+    """Return a function that executes a run and returns the path of its output and its messages."""
 
     def run(text: str, *settings: str):
         write_input(tmp_path, text)
@@ -34,7 +34,7 @@ def run_of(performed):
 
 @pytest.fixture
 def observed(performed):
-    """Return a function that performs a run of an input and returns all data of its output."""
+    """Return a function that executes a run of an input and returns all data in its output."""
     return lambda *words: contents(performed(*words)[0])
 
 
@@ -49,7 +49,7 @@ SHEARED = """&run seed = 3 /
 
 
 def test_a_pair_meets_across_the_seam_as_inside(run_of):
-    """A collision across the sheared boundary is equivalent to a collision inside the box."""
+    """A collision across the sheared boundary is equivalent to one inside the box."""
     slip, lift = 0.3 * 10, np.array([0, 4.5])
     place = np.array([[3, 5], [4.2, 5.9]])
     velocity = np.array([[0.5, 0.3], [-0.6, -0.4]])
@@ -70,8 +70,7 @@ def test_a_pair_meets_across_the_seam_as_inside(run_of):
     assert len(inside.event_log().time) == len(across.event_log().time) == 1
     assert across.event_log().time == pytest.approx(inside.event_log().time, rel=1e-13)
     assert across.event_log().impulse == pytest.approx(inside.event_log().impulse, rel=1e-13)
-    # Disk b is now below the sheared boundary and slower by the velocity of the image, or above the
-    # boundary.
+    # Disk b is now below the sheared boundary and slower by the velocity of the image, or above it.
     rows = across.image[-1][1, 1] - across.image[0][1, 1]
     frame = np.array([[0, 0], [slip * (1 + rows), 0]])
     assert across.velocity[-1] + frame == pytest.approx(inside.velocity[-1], rel=1e-12)
@@ -80,7 +79,7 @@ def test_a_pair_meets_across_the_seam_as_inside(run_of):
 
 
 def test_a_free_disk_goes_straight_on(run_of):
-    """The unwrapped path of a free disk is straight, also across periodic sides."""
+    """The unwrapped path of a free disk is straight, even across periodic sides."""
     run = run_of(
         """&box lower = -1, 2 upper = 2, 4 boundary = 'periodic', 'periodic' shear_rate = -0.4 /
         &species name = 'a' radius = 0.1 position = 0.5, 2.5 velocity = 0.3, 1.7 /
@@ -147,7 +146,7 @@ ONE = """&box boundary = 'periodic', 'periodic' upper = 50, 50 /
 def test_kicks_are_at_multiples_of_the_interval_and_no_events(
     observed, every, interval, end, steps, kicked
 ):
-    """The velocity changes only at kicks, or at the end of a time step that contains a kick."""
+    """The velocity changes only at kicks, or at the end of a time step that contains one."""
     drive = f"&drive kind = 'brownian' interval = {interval} temperature = 1 / &stop time = {end} /"
     found = observed(ONE.format(every) + drive + steps)
     velocity = found["/particles/disks/velocity/value"][:, 0]
@@ -157,7 +156,7 @@ def test_kicks_are_at_multiples_of_the_interval_and_no_events(
 
 
 def test_energy_balances_where_kinetic_and_potential_energy_cancel(observed):
-    """The total energy of many disks is much smaller than its parts, but equally accurate."""
+    """The total energy of many disks is much smaller than its parts, but just as accurate."""
     found = observed(
         """&box lower = -0.5, 9.5 upper = 0.5, 10.5 gravity = 0, 0.1 /
         &species count = 5000 packing_fraction = 0.1 temperature = 1 /
@@ -167,11 +166,11 @@ def test_energy_balances_where_kinetic_and_potential_energy_cancel(observed):
     names = ("total_energy", "drive_energy", "dissipated_energy")
     total, given, lost = (found[f"/observables/{name}/value"] for name in names)
     assert abs(total).max() < 500 and abs(given).max() > 1
-    assert np.ptp(total + lost - given) <= 1e-16 * 10_000  # of both
+    assert np.ptp(total + lost - given) <= 1e-16 * 10_000  # rounding errors of both
 
 
 def test_what_was_met_last_is_met_again_after_a_kick(observed):
-    """Two touching disks are repeatedly driven against each other, and no collision is missed."""
+    """Two touching disks are driven against each other repeatedly, and no collision is missed."""
     found = observed(
         "&species count = 2 radius = 0.1 position = 0.1, 0.5, 0.3, 0.5 /"
         "&box upper = 0.400001, 1 / &contact restitution = 0.99 contact_time = 1e-12 /"
@@ -182,7 +181,7 @@ def test_what_was_met_last_is_met_again_after_a_kick(observed):
 
 
 def test_the_kicks_of_a_disk_are_its_own(observed):
-    """The kicks of a disk do not depend on other disks, or on the place of the disk in memory."""
+    """The kicks of a disk do not depend on other disks, or on its place in memory."""
     drive = "&drive kind = 'brownian' interval = 0.1 temperature = 1e-4 / &stop time = 1 /"
     disk = "&species count = 1 radius = 0.01 position = 0.9, 0.9 /"
     others = "&species grid = 20, 20 radius = 0.01 region = 0, 0.8, 0, 0.8 /"
@@ -194,14 +193,14 @@ def test_the_kicks_of_a_disk_are_its_own(observed):
 
 
 def test_a_gas_at_rest_waits_for_its_kick(performed):
-    """A run of disks at rest ends correctly after the first kick, without a time in stop rules."""
+    """A run of disks at rest ends correctly after the first kick, without a time limit."""
     drive = "&drive kind = 'noise' interval = 7 strength = 1 / &stop collisions = 1000 /"
     _, said = performed("&species count = 100 radius = 0.01 /" + drive)
     assert "note" not in said and "kicks = 1\n" in said and "collisions = 1000\n" in said
 
 
 def test_a_driven_gas_does_not_end_for_being_cold(performed):
-    """The temperature of a driven gas may fall below 1e-25 of its first value between kicks."""
+    """Between kicks the temperature may fall below 1e-25 of its initial value."""
     _, said = performed(
         "&box boundary = 'periodic', 'periodic' /"
         "&species count = 50 packing_fraction = 0.4 temperature = 1 /"
@@ -220,7 +219,7 @@ rotational_diffusion = {} turning_rate = {} /
 
 
 def test_chiral_disks_move_on_circles(run_of):
-    """Without diffusion and heat the path of a disk is a regular polygon, counter-clockwise."""
+    """Without diffusion and heat, a disk moves counter-clockwise on a regular polygon."""
     interval, speed, rate = 0.1, 1.5, 2 * np.pi / 5
     run = run_of(CHIRAL.format(3, interval, speed, 0, rate, 10.1, interval))
     r = run.unwrapped(slice(1, None))
@@ -263,13 +262,13 @@ FALLING = """&run seed = 4 /
 
 
 def recycled_now(found) -> np.ndarray:
-    """Return which disks (T - 1, N) were recycled between a frame and the next frame."""
+    """Return which disks (T - 1, N) were recycled between each frame and the next."""
     return np.diff(found["/particles/disks/recycled/value"], axis=0) > 0
 
 
 @pytest.mark.parametrize("side", ["wall", "periodic"])
 def test_disks_in_one_region_continue_in_the_other(observed, side):
-    """Frames at the times of recycling show each recycled disk in its new place and no other."""
+    """Frames at the times of recycling show each recycled disk, and no other, in a new place."""
     found = observed(FALLING.format(side, "velocity = 0.5, -2 species = 'a'"))
     x, v, spin = (
         found[f"/particles/disks/{name}/value"]
@@ -291,7 +290,7 @@ def test_disks_in_one_region_continue_in_the_other(observed, side):
 
 
 def test_recycled_disks_have_the_temperature_of_the_drive(observed):
-    """Velocities and spins of recycled disks are Gaussian; places are uniform in the region."""
+    """Their velocities and spins are Gaussian, their positions uniform in the region."""
     text = FALLING.format("wall", "temperature = 3").replace("time = 10", "time = 60")
     found = observed(text)
     now = recycled_now(found)
@@ -311,7 +310,7 @@ def test_recycled_disks_have_the_temperature_of_the_drive(observed):
 
 
 def test_disks_wait_until_there_is_room(observed):
-    """A disk that finds no free place stays; it moves when the disk in its way has gone."""
+    """A disk without a free place waits, and moves when the disk in its way has gone."""
     found = observed(
         """&box upper = 6, 1 /
         &species name = 'a' radius = 0.4 position = 0.6, 0.5 /
@@ -327,7 +326,7 @@ def test_disks_wait_until_there_is_room(observed):
 
 
 def test_a_recycled_disk_has_no_last_contact(observed):
-    """A disk hits the floor immediately after it was recycled, and loses energy there."""
+    """A disk hits the floor immediately after being recycled, and loses energy there."""
     found = observed(
         """&species count = 1 radius = 0.1 position = 0.5, 0.2 velocity = 0, -1 /
         &contact restitution = 0.5 contact_time = 10 / &output frames_every_events = 1 /
@@ -339,7 +338,7 @@ def test_a_recycled_disk_has_no_last_contact(observed):
 
 
 def test_disks_at_rest_outside_the_region_end_the_run(performed):
-    """A run without a time limit ends if no disk moves and no disk can be recycled."""
+    """A run without a time limit ends if no disk moves and none can be recycled."""
     _, said = performed(
         """&species count = 2 radius = 0.1 position = 0.5, 0.5, 0.5, 0.1 /
         &drive kind = 'recycle' interval = 0.3 velocity = 0, 0 from_region = 0, 1, 0, 0.2
@@ -358,7 +357,7 @@ BOUNCE = """&box gravity = 0, -1 upper = 1, 1000 /
 
 
 def test_a_disk_between_two_walls_knows_them_apart(observed):
-    """The left wall halves the speed of the disk, and the right wall conserves its speed."""
+    """The left wall halves the speed of the disk, the right wall conserves it."""
     found = observed(
         """&side name = 'left' restitution = 0.5 / &species count = 1 radius = 0.1
         position = 0.5, 0.5 velocity = 1, 0 / &stop time = 6 / &output frames_every_events = 1 /"""
@@ -392,7 +391,7 @@ def test_disks_grow_between_walls_whatever_their_law(observed, law):
 
 @pytest.mark.parametrize("dynamics", ["events", "steps"])
 def test_a_side_shakes_a_bed_at_rest(observed, dynamics):
-    """All disks are at rest and there is no gravity; the moving side causes the first event."""
+    """All disks are at rest without gravity, so that the moving side causes the first event."""
     found = observed(
         """&side name = 'bottom' motion = 'sine' amplitude = 0.05 period = 1 /
         &run dt = 1e-3 / &species count = 300 radius = 0.02 / &stop time = 3 /""".replace(
@@ -416,7 +415,7 @@ def test_a_side_that_crushes_disks_ends_the_run(ricochet, tmp_path):
 
 
 def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
-    """A disk collides with the side before and during the motion of the side."""
+    """A disk hits the side before and during its motion."""
     found = observed(
         """&side name = 'right' motion = 'constant_velocity' velocity = -0.5
         start_time = 1 end_time = 4 /
@@ -461,7 +460,7 @@ def test_sides_start_where_their_position_is(observed, placement):
 
 
 def test_disks_meet_wherever_a_side_that_they_push_goes(observed):
-    """All collisions occur, even if a piston moves far outside the initial box."""
+    """All collisions occur even if a piston moves far outside the initial box."""
     cells, pairs = (
         observed(
             f"""&run search = '{search}' /
@@ -500,7 +499,7 @@ def test_a_side_that_disks_push_keeps_momentum_and_energy(observed):
 
 
 def test_time_steps_come_close_to_events(observed):
-    """At a small time step, bounces on a moving floor occur at the event-driven times."""
+    """With a small time step, a disk bounces on a moving floor at the event-driven times."""
     times = [
         observed(BOUNCE, *options)["/particles/disks/velocity/time"][1:6]
         for options in ([], ["run.dynamics=steps", "run.dt=1e-5"])
@@ -533,7 +532,9 @@ PRESSED = """lower = -1.5, 10 upper = 1.5, 11 /
 
 @pytest.mark.parametrize(
     ("floor", "disk"),
-    [  # it chatters to rest on a floor whose acceleration is less than gravity, or has no room; or
+    # It chatters to rest on a floor that accelerates less than gravity, or if it has no room, or if
+    # a force presses a side against it.
+    [
         # a side that a force presses against the disk does
         (FLOOR.format("sine' amplitude = 0.01"), "0.1 position = 0.5, 0.3"),
         (FLOOR.format("parabolic' amplitude = 0.01"), "0.1 position = 0.5, 0.3"),

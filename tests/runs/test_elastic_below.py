@@ -17,9 +17,9 @@ COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet", "--force"]
 
 @pytest.mark.parametrize("seed", range(24))
 def test_no_row_of_disks_collapses_with_any_common_velocity(ricochet, tmp_path, seed):
-    """The dissipated energy does not depend on a common velocity, apart from rounding errors.
+    """The dissipated energy does not depend on a common velocity, except for rounding errors.
 
-    Of the rows of these seeds, 12 collapse with a constant restitution.
+    With a constant restitution, 12 of the rows with these seeds collapse.
     """
     system, dissipated = System(seed), []
     for common in {system.common, 0.0}:
@@ -33,7 +33,7 @@ def test_no_row_of_disks_collapses_with_any_common_velocity(ricochet, tmp_path, 
 
 
 def test_pairs_above_the_speed_lose_energy_and_pairs_below_do_not(ricochet, tmp_path):
-    """Restitution of pairs just below and just above the speed, also at a moving side."""
+    """Pairs collide just below and just above the speed, some of them at a moving side."""
     for speed, left in ((0.999999, 1.0), (1.000001, 0.5)):
         text = f"""&contact restitution = 0.5 wall_rule = 'normal' {LAW} 1 / &stop events = 1 /
             &side name = 'right' motion = 'sawtooth' velocity = 0.25 /
@@ -52,10 +52,10 @@ def test_pairs_above_the_speed_lose_energy_and_pairs_below_do_not(ricochet, tmp_
 
 @pytest.mark.parametrize("speed", [0.03, 0.1])
 def test_the_energy_of_a_line_of_5000_disks_decays_as_time_to_the_power_two_thirds(speed):
-    """A gas of sticky particles on a ring, E ~ t^(-2/3), whatever the reference speed.
+    """A gas of sticky particles on a ring has E ~ t^(-2/3), whatever the reference speed.
 
     Ben-Naim, Chen, Doolen and Redner, Physical Review Letters 83, 4069 (1999), use the same law of
-    restitution: at late times the gas of any restitution below 1 is that of Burgers' equation
+    restitution: at late times, the gas of any restitution below 1 is that of Burgers' equation
     without viscosity. The test takes about 1 s for each speed.
     """
     disks, rng = 5000, np.random.default_rng(5)

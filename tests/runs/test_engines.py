@@ -1,7 +1,7 @@
 """Tests of sweeps with real Slurm and GNU parallel over ssh on this computer.
 
-The daemons listen only on the loopback interface.  The tests start the daemons, and end them by
-their process ids.
+The daemons listen only on the loopback interface. The tests start them, and end them by their
+process ids.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ from ricochet import read_run
 from synthetic_run import ROOT
 from whole_runs import PATIENCE, differences, environment, frames_in, ran, wait_for
 
-# The tests need daemons and take a minute; therefore only `.ci/run` and `make check` run them.
+# Only run by `.ci/run` and `make check`, because the tests need daemons and take a minute.
 pytestmark = pytest.mark.check
 
 SCRIPT = ROOT / "runs" / "ensemble.sh"
@@ -29,7 +29,7 @@ LONG = ("--set", "stop.collisions_per_disk=6000", "--set", "output.frames_every_
 
 
 def need(*programs: str) -> None:
-    """Skip the test if programs are missing, and name these programs."""
+    """Skip the test if programs are missing, naming these programs."""
     places = f"{os.environ['PATH']}:/usr/sbin:/sbin"
     missing = [name for name in programs if not shutil.which(name, path=places)]
     if missing:
@@ -44,7 +44,7 @@ def free_port() -> int:
 
 @contextlib.contextmanager
 def daemon(folder: Path, *command, ready):
-    """Start a process, wait until `ready()` is true, and end the process after the block."""
+    """Start a process, wait until `ready()` is true, and end it after the block."""
     name = Path(command[0]).name
     command = [shutil.which(command[0], path=f"{os.environ['PATH']}:/usr/sbin"), *command[1:]]
     log = (folder / f"{name}.out").open("w")
@@ -71,7 +71,7 @@ def answers(port: int) -> bool:
 def ensemble(program, tmp_path):
     """Return a function that runs ensemble.sh in a separate folder.
 
-    With start=True the function does not wait for the end of the script.
+    With start=True it does not wait for the end of the script.
     """
 
     def run(*arguments, start=False):
@@ -165,7 +165,7 @@ def test_parallel_reports_a_member_that_fails(ensemble):
 
 
 def test_term_reaches_members_on_other_hosts(ensemble, hosts, tmp_path):
-    """Signal TERM stops the member runs on other hosts, and the same command completes them."""
+    """TERM stops the member runs on other hosts, and the same command completes them."""
     arguments = ("--engine", "parallel", "--sshloginfile", hosts, "-j", 1, "--seeds", "1-2", *LONG)
     running, folder = ensemble(*arguments, start=True), tmp_path / "members"
     wait_for(lambda: sum(frames_in(path) > 0 for path in folder.glob("*.part")) == 2)
@@ -251,7 +251,7 @@ def test_slurm_runs_all_members(ensemble, cluster, tmp_path):
 
 
 def test_slurm_extends_finished_members_with_the_same_bits(ensemble, cluster, tmp_path):
-    """A sweep with a later end submits its finished members again, and each of them goes on."""
+    """A sweep with a later end submits its finished members again, and each of them continues."""
     later = ("--set", "stop.collisions_per_disk=4")
     arguments = ("--engine", "slurm", "-j", 2, "--seeds", "1-2", *SMALL)
     ensemble(*arguments)
@@ -277,15 +277,15 @@ def test_slurm_is_not_given_the_same_work_twice_and_keeps_the_limit(ensemble, cl
     wait_for(lambda: list(folder.glob("*.part")))
     again = ensemble(*arguments)
     assert again.returncode == 75 and "is not finished: 0 of 2 members finished" in again.stderr
-    assert len(list(folder.glob("*.part"))) == 1  # %1, though there are two processors
+    assert len(list(folder.glob("*.part"))) == 1  # %1, although there are two processors
     assert len(cluster("squeue", "--noheader", "--array").splitlines()) == 2
 
 
 @pytest.mark.parametrize(
     "how",
     [
-        ("scontrol", "requeue"),  # Slurm starts it again when `cred_expire` seconds are over
-        ("scancel", "--batch", "--signal=TERM"),  # as --signal=B:TERM@60 does when time is over
+        ("scontrol", "requeue"),  # Slurm starts it again after `cred_expire` seconds
+        ("scancel", "--batch", "--signal=TERM"),  # as --signal=B:TERM@60 does at the time limit
     ],
 )
 def test_a_member_that_is_put_back_goes_on(ensemble, cluster, tmp_path, how):
@@ -301,7 +301,7 @@ def test_a_member_that_is_put_back_goes_on(ensemble, cluster, tmp_path, how):
 
 
 def test_a_time_limit_puts_every_task_back(ensemble, cluster, tmp_path, monkeypatch):
-    """The last task of the array, too: two tasks of one member each stay in the queue."""
+    """This includes the last task of the array: two tasks of one member each stay in the queue."""
     monkeypatch.setenv("SBATCH_TIMELIMIT", "00:02:00")
     endless = (*LONG, "--set", "stop.collisions_per_disk=", "--set", "stop.time=1e9")
     ensemble("--engine", "slurm", "-j", 2, "--seeds", "1-2", *endless)

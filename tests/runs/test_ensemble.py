@@ -1,7 +1,7 @@
 """Tests of runs/ensemble.sh: starting, skipping, resuming and reporting member runs.
 
-Most tests replace the simulation program by a script.  Tests with the real program check that
-interruptions and the order of member runs do not change the results.
+In most tests a script replaces the simulation program. Tests with the real program check that
+neither interruptions nor the order of member runs affect the results.
 """
 
 import contextlib
@@ -24,10 +24,10 @@ from whole_runs import within, write_input
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "runs" / "ensemble.sh"
 
-# This script replaces the simulation program.  It records each start in OUT.starts, and waits while
-# the file HOLD exists.  On TERM it writes a checkpoint.  With `outcome.exit=N` it fails with the
-# exit status N: 2 also makes --check fail, 9 means that it is killed, and after 4 the run cannot be
-# resumed.  A member run cannot be continued with other settings.
+# This script replaces the simulation program. It records each start in OUT.starts, and waits as
+# long as the file HOLD exists. On TERM it writes a checkpoint. With `outcome.exit=N` it fails with
+# the exit status N: 2 also makes --check fail, 9 means that it is killed, and after 4 the run
+# cannot be resumed. A member run cannot be continued with other settings.
 PROGRAM = """while (($#)); do
   case $1 in
   -o) out=${2%.h5} && shift ;;
@@ -102,7 +102,7 @@ def test_a_script_without_the_file_of_its_functions_says_so(lab):
 
 
 def started(lab, *options, members):
-    """Start a sweep in which members wait until the file `hold` is removed."""
+    """Start a sweep whose members wait until the file `hold` is removed."""
     before = len(starts(lab))
     (lab / "hold").touch()
     process = subprocess.Popen(
@@ -117,13 +117,13 @@ def started(lab, *options, members):
 
 
 def workers_of(launcher) -> list[int]:
-    """Return the process ids of workers."""
+    """Return the process ids of the workers."""
     pid = launcher.pid
     return list(map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split()))
 
 
 def waits(launcher) -> bool:
-    """Return whether the launcher and its worker processes are all waiting."""
+    """Return whether the launcher and all its workers are waiting."""
     return all(map(is_asleep, [launcher.pid, *workers_of(launcher)]))
 
 
@@ -135,7 +135,7 @@ def starts(lab):
 
 
 def test_members_are_seeds_times_values(lab):
-    """A sweep has a member run for each seed and value; semicolons separate vector values."""
+    """There is a member run for each seed and value; semicolons separate vector values."""
     scan = ["--scan", "species.ball.velocity=0,-1;0,-2", "--set", "contact.restitution=0.5"]
     result = ensemble(lab, "--seeds", "1-2,5", *scan)
     assert result.returncode == 0
@@ -158,7 +158,7 @@ def test_members_take_a_core_each_whatever_the_cluster_says(lab, monkeypatch):
 
 
 def test_names_and_values_may_be_anything(lab):
-    """Any names and values are allowed, also if a list of member runs is used as a manifest."""
+    """This holds even if a list of member runs is used as a manifest."""
     names = ["*", "@", "$HOME", "a;b", "[x]", "'", '"', "!", "~", "a&b"]
     names += ["%s", "\\n", "ü", "one two"]
     rest = "--set run.title=a b --set species.ball.velocity=0,-1"
@@ -185,7 +185,7 @@ def test_finished_members_are_skipped_and_checkpoints_resumed(lab):
 
 @pytest.mark.parametrize("jobs", ["1", "3"])
 def test_one_failure_does_not_stop_the_others(lab, jobs):
-    """A failed member run is attempted once; a stopped member run does not count as failed."""
+    """A failed member run is attempted once; a stopped one does not count as failed."""
     manifest = lab / "members.txt"
     manifest.write_text("a\nb\t--set outcome.exit=4\nc\nd\t--set outcome.exit=75\n")
     result = ensemble(lab, "--manifest", str(manifest), "-j", jobs)
@@ -264,7 +264,7 @@ def test_slurm_gives_up_what_failed_and_says_who_when_and_where(lab, slurm):
 
 
 def test_every_task_of_an_array_is_requeued_when_its_time_is_over(lab, slurm):
-    """Each one under its own number, and no task whose members are finished."""
+    """Each under its own number, except tasks whose members have finished."""
     manifest = lab / "members.txt"
     manifest.write_text("a\t--set outcome.exit=75\nb\t--set outcome.exit=75\n")
     assert slurm("--manifest", str(manifest)).returncode == 75
@@ -289,9 +289,9 @@ def test_members_share_tasks_and_the_site_has_numbers_for_them(lab, slurm, optio
     assert slurm("--seeds", "1-5").returncode == 0 and len(starts(lab)) == 5
 
 
-# Each bash reads this script at its start.  It sends TERM just before the command MOMENT, or before
-# command number MOMENT of the shell.  If a worker process receives the signal, the launcher
-# receives it as well.
+# Each bash reads this script when it starts. The script sends TERM just before the command MOMENT,
+# or before command number MOMENT of the shell. If a worker receives the signal, so does the
+# launcher.
 AT_A_COMMAND = """if [[ $0 == */ensemble.sh ]]; then
 set -T
 trap 'if [[ $BASH_COMMAND == "$MOMENT" || $((++commands_so_far)) == "$MOMENT" ]] &&
@@ -301,7 +301,7 @@ trap 'if [[ $BASH_COMMAND == "$MOMENT" || $((++commands_so_far)) == "$MOMENT" ]]
 fi' DEBUG
 fi
 """
-#: Commands that are started with `&`, and a command just before such a command.
+#: Commands started with `&`, and a command just before one of them.
 NARROW_MOMENTS = ["child=$!", "workers+=($!)", 'arguments+=(--set "$pair")']
 RANDOM_MOMENTS = [str(random.Random(1).randrange(10, 500)) for _ in range(200)]
 
@@ -340,7 +340,7 @@ def processes_of(folder) -> dict[int, list[str]]:
 
 @pytest.mark.parametrize("shares", [1, 2, 3, 9])
 def test_each_member_of_a_manifest_is_in_one_share(lab, shares):
-    """Each member run is in exactly one share, also if there are more shares than member runs."""
+    """This holds even if there are more shares than member runs."""
     manifest = lab / "members.txt"
     manifest.write_text("# members\na\nb\t--set run.seed=2\n\nc\nd\ne")
     for k in range(1, shares + 1):
@@ -431,7 +431,7 @@ def test_what_cannot_name_a_member_is_one_line(lab, name):
 @pytest.mark.parametrize("how", ["link", "link to nothing", "hard link", "pipe", "folder", "file"])
 @pytest.mark.parametrize("name", ["seed_2.log", "input.nml", "manifest.txt"])
 def test_only_files_of_its_own_are_written(lab, name, how):
-    """If foreign files have names that the script uses, it reports them at the start."""
+    """If names used by the script belong to foreign files, it reports them at the start."""
     (lab / "out").mkdir()
     precious = lab / "precious"
     precious.write_text("precious")
@@ -515,7 +515,7 @@ def test_dry_run_checks_the_first_member(program, tmp_path):
 
 @pytest.fixture
 def real(program, tmp_path):
-    """Return a function that starts a sweep of the real program with six members by default."""
+    """Return a function that starts a sweep of the real program, by default with six members."""
     text = MIXTURE.replace("event_log", "checkpoint_every = 0.05 event_log")
     input_file = write_input(tmp_path, text.replace("time = 4", "time = 20"))
 
@@ -538,12 +538,12 @@ def finish(process) -> int:
 
 
 def members_in(folder) -> list[int]:
-    """Return the process ids of the programs that write into a folder."""
+    """Return the process ids of the programs that write to a folder."""
     return [pid for pid, words in processes_of(f"{folder}/").items() if "-o" in words]
 
 
 def disturb(process, folder, rng):
-    """Send TERM or KILL to the launcher or a member."""
+    """Send TERM or KILL to the launcher or to a member."""
     how = rng.choice([signal.SIGTERM, signal.SIGKILL])
     members = members_in(folder)
     victim = rng.choice(members) if members and rng.random() < 0.5 else process.pid
@@ -561,7 +561,7 @@ def differences_of(one, other) -> list[str]:
 
 @pytest.mark.parametrize("times", [5, pytest.param(20, marks=pytest.mark.check)])
 def test_a_disturbed_ensemble_equals_an_undisturbed_one(real, tmp_path, times):
-    """A sweep that is interrupted by TERM and KILL at random times has the same results."""
+    """A sweep interrupted by TERM and KILL at random times has the same results."""
     begin = time.monotonic()
     assert finish(real("calm", "-j", "2")) == 0
     duration = time.monotonic() - begin

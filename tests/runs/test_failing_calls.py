@@ -1,4 +1,4 @@
-"""If a system call of a run fails or is interrupted, the run prints one line and loses no data."""
+"""Failed or interrupted system calls: the run prints one line and loses no data."""
 
 import os
 import re
@@ -13,9 +13,9 @@ import pytest
 from whole_runs import FILES, FINISHED, PATIENCE, STOPPED, USAGE
 from whole_runs import committed, differences, is_beginning, one_line, ran, write_input
 
-#: This input leads to few system calls, but to all kinds of them.  The number of frames is known in
-#: advance, but the numbers of observables and events are not; therefore the file is rebuilt at the
-#: end.  The run writes two checkpoints.
+#: This input causes few system calls, but all kinds of them. The number of frames is known in
+#: advance, but those of observables and events are not, so that the file is rebuilt at the end. The
+#: run writes two checkpoints.
 SMALL = """&box boundary = 'periodic', 'wall' /
 &species name = 'gas' file = 'gas.txt' radius = 0.03 temperature = 1 /
 &stop events = 2 /
@@ -23,10 +23,9 @@ SMALL = """&box boundary = 'periodic', 'wall' /
 """
 COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
 #: Options with which the run starts: it replaces a result, resumes a stopped run, or extends a
-#: finished run.
+#: finished one.
 OPTIONS = ("--force", "--resume", "--resume --quiet")
-#: System calls of the program, and how they fail; the sign + means that all later calls fail as
-#: well.
+#: System calls of the program, and how they fail; + means that all later calls fail, too.
 WAYS = {
     "openat": ["EIO", "EIO+"],
     "read": ["EIO", "EIO+"],
@@ -45,9 +44,9 @@ WAYS = {
 
 @pytest.fixture(scope="module")
 def stage(program, tmp_path_factory):
-    """Return a folder with the expected result, starting folders for each option, and traces.
+    """Return a folder with the expected result, and starting folders and traces for each option.
 
-    The folders and traces have the names of the options.
+    Folders and traces are named like the options.
     """
     if not shutil.which("strace"):
         pytest.skip("strace is not installed")
@@ -75,7 +74,7 @@ def stage(program, tmp_path_factory):
 
 
 def copy_folder(source, target):
-    """Copy a folder with `cp`, because functions of Python do not preserve holes of files."""
+    """Copy a folder with `cp`, because Python functions do not preserve holes in files."""
     subprocess.run(["cp", "-a", source, target], check=True)
 
 
@@ -86,7 +85,8 @@ def started(*command, folder):
 
 def traced(program, folder, option, *what):
     """Start the run under strace, which writes to the file `trace`."""
-    fast = [] if ":signal=" in "".join(what) else ["--seccomp-bpf"]  # with it strace 6.1 sends none
+    # with this option strace 6.1 sends no signals
+    fast = [] if ":signal=" in "".join(what) else ["--seccomp-bpf"]
     strace = ["strace", *fast, "-f", "-y", "-o", "trace", *what]
     return started(*strace, program, *COMMAND, *option.split(), folder=folder)
 
@@ -120,7 +120,7 @@ def outcome(check, program, stage, option, call, inject) -> str:
 
 
 def same_results(stage, result) -> bool:
-    """Return whether results are equal except for wall times, by a fast comparison of bytes."""
+    """Return whether results agree except for wall times, by a fast comparison of bytes."""
     whole = stage / "whole" / "gas.h5"
     return timeless(whole) == timeless(result) or differences(whole, result) == []
 
@@ -152,7 +152,7 @@ def check_after_failure(program, stage, folder, option, call, inject):
 
 
 def go_on(program, stage, folder, option):
-    """Check that the remaining file is valid and that the run continues or starts again."""
+    """Check that the remaining file is valid, and that the run continues or starts again."""
     part = folder / "gas.h5.part"
     if part.exists():
         found = committed(part)
@@ -183,7 +183,7 @@ def check_after_signal(program, stage, folder, option, call, inject):
     before = contents_of(folder)
     run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
     trace = (folder / "trace").read_text()
-    if "--- SIGTERM" not in trace:  # reading system information needs a varying number of calls
+    if "--- SIGTERM" not in trace:  # reading system information takes a varying number of calls
         made = len(re.findall(rf"^\d+ +{call}\(", trace, re.MULTILINE))
         assert made < int(inject.rpartition("=")[2]), "no signal was sent"
         assert run.returncode == FINISHED
@@ -207,7 +207,7 @@ def contents_of(folder) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "trace"}
 
 
-#: Disturbances of a call in the syntax of strace, and the property that is checked for each.
+#: Disturbances of a call in the syntax of strace, with the property checked for each.
 KILLED = ("pwrite64", "ftruncate", "fsync", "rename", "unlink", "openat")
 MEETINGS = [(check_after_failure, call, [f"error={way}" for way in WAYS[call]]) for call in WAYS]
 MEETINGS += [(check_after_signal, call, ["signal=SIGTERM"]) for call in WAYS]
@@ -217,10 +217,9 @@ MEETINGS += [(check_after_kill, call, ["signal=SIGKILL"]) for call in KILLED]
 @pytest.mark.parametrize(("check", "call", "ways"), MEETINGS)
 @pytest.mark.parametrize("step", [250, pytest.param(1, marks=pytest.mark.check)])
 def test_whatever_meets_a_call_costs_nothing(program, stage, check, call, ways, step):
-    """After a failed call, a signal or a kill, no data are lost.
+    """No data are lost after a failed call, a signal or a kill.
 
-    The calls that complete the file, most of them `pwrite64`, are disturbed one by one; that takes
-    5 s.
+    The calls that complete the file, mostly `pwrite64`, are disturbed one by one, which takes 5 s.
     """
     cases = [
         (option, f"inject={call}:{what}:when={number}{again}")
@@ -239,7 +238,7 @@ def test_whatever_meets_a_call_costs_nothing(program, stage, check, call, ways, 
 
 @pytest.mark.parametrize("option", OPTIONS)
 def test_a_file_that_seems_to_exist_for_a_moment_is_no_danger(program, stage, option):
-    """The first of several calls fails that examine whether the unfinished output exists."""
+    """The first of several calls that look for the unfinished output fails."""
     lines = (stage / f"trace{option}").read_text().splitlines()
     calls = [line for line in lines if re.match(r"\d+ +newfstatat\(", line)]
     numbers = [number for number, line in enumerate(calls, start=1) if '"gas.h5.part"' in line]

@@ -1,4 +1,4 @@
-"""Tests of what a newcomer can do after `make demo` alone, with the environment that it makes."""
+"""Tests of what works after `make demo` alone, in the environment that it creates."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.check
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory) -> Path:
-    """Return a clone of the last commit in which only `make demo` has been called."""
+    """Return a clone of the last commit in which only `make demo` has been run."""
     folder = tmp_path_factory.mktemp("newcomer") / "ricochet"
     ran("git", "clone", "--quiet", ROOT, folder, check=True)
     ran("make", "demo", cwd=folder, env=newcomer(), check=True)
@@ -22,7 +22,7 @@ def clone(tmp_path_factory) -> Path:
 
 
 def newcomer(**more) -> dict[str, str]:
-    """Return an environment that leads to no program or package outside of the clone."""
+    """Return an environment that leads to no program or package outside the clone."""
     mine = environment(MPLBACKEND="Agg", **more)
     foreign = ("RICOCHET", "RICOCHET_LIBRARY", "PYTHONPATH", "BUILD", "MAKEFLAGS", "MAKELEVEL")
     return {name: value for name, value in mine.items() if name not in foreign}
@@ -50,7 +50,7 @@ def test_the_blocks_of_the_readme_work(clone):
 
 @pytest.mark.parametrize("page", RUN, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_the_first_commands_of_a_page_work(page, clone):
-    """The first block that is executed, with the files that the blocks before it contain."""
+    """The first executable block is run with the files contained in the blocks before it."""
     ran("git", "clean", "-fdxq", "--exclude=demo", "runs", cwd=clone, check=True)
     for language, code in blocks_of(page.read_text()):
         if language in FIRST_LINE:

@@ -1,4 +1,4 @@
-"""Laws that the results of the Python examples of the guides must fulfil."""
+"""Laws that the results of the Python examples in the guides must obey."""
 
 import re
 
@@ -9,7 +9,7 @@ from synthetic_run import ROOT
 
 
 def carried_out(guide, *headings):
-    """Execute the Python examples of sections of a guide; return their variables."""
+    """Execute the Python examples in sections of a guide; return their variables."""
     text = (ROOT / "docs" / "guides" / f"{guide}.md").read_text()
     variables: dict = {}
     for heading in headings:
@@ -44,7 +44,7 @@ def test_a_thermostat_at_collisions_sets_the_temperature_and_conserves_momentum(
 
 
 def test_the_event_log_of_a_stadium_contains_its_lyapunov_exponent(monkeypatch):
-    """The exponent of 20000 collisions differs by a few per cent from the published 0.43."""
+    """The exponent of 20000 collisions differs from the published 0.43 by a few per cent."""
     monkeypatch.chdir(ROOT)
     found = carried_out("billiards", "## Stadium and mushroom")
     log = found["log"]
@@ -68,4 +68,4 @@ def test_a_simulation_stops_exactly_when_a_disk_enters_a_region():
     found = carried_out("functions-of-events", *headings)
     arrivals = found["arrivals"]
     assert len(set(arrivals)) == 20 and max(arrivals) < 1000
-    assert np.mean(arrivals) < np.mean(found["times"])  # the strip is before the side
+    assert np.mean(arrivals) < np.mean(found["times"])  # the strip is in front of the side

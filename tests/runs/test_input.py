@@ -33,7 +33,7 @@ PLACE = r'f(:\d+)?: (\S+|".*"): |--set '
 
 @pytest.fixture
 def checked(ricochet, tmp_path):
-    """Return a function that runs --check on a file gas.nml with the given contents."""
+    """Return a function that runs --check on a file gas.nml with given contents."""
 
     def run(content, *options, **more):
         data = content.encode() if isinstance(content, str) else content
@@ -44,7 +44,7 @@ def checked(ricochet, tmp_path):
 
 
 def lines_of(run) -> list[str]:
-    """Return the lines on stderr, and check that none is from the Fortran run-time library."""
+    """Return the lines on stderr, none of which may be from the Fortran run-time library."""
     assert not re.search(r"backtrace|SIG[A-Z]{3}|libgfortran|Fortran runtime", run.stderr)
     return run.stderr.splitlines()
 
@@ -108,7 +108,7 @@ def drawn(rng: random.Random, row: dict) -> object:
 
 
 def spelt(rng: random.Random, value: object) -> str:
-    """Return a random spelling of a value or list; equal elements may be written with a count."""
+    """Return a random spelling of a value or list, in which a count may replace equal elements."""
     if isinstance(value, list):
         words = []
         for one, row in itertools.groupby(value):
@@ -128,7 +128,7 @@ def spelt(rng: random.Random, value: object) -> str:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_values_in_all_their_spellings_are_printed(ricochet, tmp_path, seed):
-    """All spellings of a value are read equally, also in inputs with incompatible values."""
+    """All spellings of a value are read alike, even in inputs with incompatible values."""
     rng = random.Random(seed)
     table = json.loads(ricochet("--print-variables").stdout)
     text, written = rng.choice(["", "\ufeff"]), []
@@ -303,7 +303,7 @@ def test_what_is_no_file_is_refused_without_waiting(ricochet, tmp_path, kind):
     elif kind == "link to nothing":
         path.symlink_to(tmp_path / "nothing")
     elif kind == "secret":
-        path.touch(0)  # for root no file is unreadable
+        path.touch(0)  # root can read any file
     run = ricochet(path, "--check")
     assert run.returncode == (USAGE if kind in ("pipe", "device", "secret") else FILES)
     assert [str(path) in line for line in lines_of(run)] == [True]
@@ -359,7 +359,7 @@ def test_wrong_usage_is_one_line(ricochet, command):
 
 
 def test_the_limits_that_are_printed_are_those_that_hold(ricochet, checked):
-    """No variable is refused as out of range if its value is within the printed limits."""
+    """No value within the printed limits is refused as out of range."""
     instance = {"species": ".gas", "obstacle": ".pin", "wall": ".ramp", "side": ".top"}
     instance |= {"change": ".1", "source": ".tap"}
     numbers = [

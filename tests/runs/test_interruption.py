@@ -87,7 +87,7 @@ def let_write(process, part, frames):
 
 
 def test_files_never_take_the_place_of_closed_standard_streams(program, tmp_path):
-    """If a standard stream is closed, no output file gets its descriptor."""
+    """If a standard stream is closed, no output file obtains its descriptor."""
     command = [program, write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG]
     shell = ["bash", "-c", 'exec "$@" <&- >&- 2>&-', "bash", *map(str, command)]
     process = subprocess.Popen(shell, cwd=tmp_path)
@@ -137,7 +137,7 @@ def shown_until_stopped(program, folder, enough):
     ids=["run", "placing"],
 )
 def test_progress_stays_on_one_line_of_the_terminal(program, tmp_path, text, shown, last):
-    """The line with the progress is truncated, not wrapped; a signal message has its own line."""
+    """The progress line is truncated, not wrapped; a signal message has its own line."""
     write_input(tmp_path, text)
     shares = []
     for line in shown_until_stopped(program, tmp_path, lambda: len({*shares}) >= 3):
@@ -171,7 +171,7 @@ def test_the_line_says_that_bounces_on_walls_slow_a_run_down(program, tmp_path, 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGINT", "SIGHUP", "SIGXCPU"])
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_signal_stops_the_run_with_a_checkpoint(started, tmp_path, name, times):
-    """A signal, or two signals in quick succession as launchers send them, lead to a checkpoint."""
+    """This holds for two signals in quick succession, too, as launchers send them."""
     process, number = start_long(started, tmp_path), getattr(signal, name)
     if times == 1:
         message = ended_soon(process, number)
@@ -204,7 +204,7 @@ def wait_for_checkpoint(folder):
 
 
 def test_a_later_second_signal_ends_the_run_at_once(started, tmp_path):
-    """A second signal ends the run, even while it waits for a disk that does not respond."""
+    """This holds even while the run waits for a disk that does not respond."""
     endless = with_fsync(tmp_path, "while (1) usleep(100000);")
     process = started(write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG, env=endless)
     wait_for((tmp_path / "gas.h5.part").exists)
@@ -242,7 +242,7 @@ def stopped_in_time(process, *codes):
 def test_a_signal_ends_a_run_that_is_still_being_set_up(
     started, tmp_path, count, packing, placement, options
 ):
-    """A signal during the preparation ends the run, because no data can be lost."""
+    """During the preparation a signal ends the run at once, because no data can be lost."""
     text = f"""&species count = {count} packing_fraction = {packing} placement = '{placement}' /
     &stop collisions = 1 /"""
     write_input(tmp_path, text)
@@ -254,10 +254,10 @@ def test_a_signal_ends_a_run_that_is_still_being_set_up(
 
 
 def test_a_slow_disk_does_not_slow_the_run_down(ricochet, tmp_path):
-    """Slow checkpoints do not increase the number of checkpoints of a run.
+    """Slow checkpoints do not increase the number of checkpoints.
 
     Writing to the simulated storage takes twice as long as the interval at which the run reads the
-    clock.  The run ends after a few dozen checkpoints, and does not write one at each collision.
+    clock. The run ends after a few dozen checkpoints, and does not write one at each collision.
     """
     slow = with_fsync(tmp_path, "static int n; usleep(60000); if (++n > 300) _exit(9); return 0;")
     text = "&species count = 10 radius = .01 speed = 1 / &stop events = 20000 /"
@@ -266,7 +266,7 @@ def test_a_slow_disk_does_not_slow_the_run_down(ricochet, tmp_path):
 
 
 def test_a_run_whose_samples_cease_still_makes_checkpoints(started, tmp_path):
-    """A run writes checkpoints even if no more samples occur, because the disks are at rest."""
+    """Checkpoints are written even after the last sample, when the disks are at rest."""
     pairs = "".join(f"0.1, {y}, {0.2 + y / 100}, {y}, " for y in range(1, 61))
     speeds = "1, 0, -1, 0, " * 60
     text = f"""&box upper = 1, 62 /
@@ -295,7 +295,7 @@ def test_a_run_whose_samples_cease_still_makes_checkpoints(started, tmp_path):
     ],
 )
 def test_many_disks_stop_in_time(started, tmp_path, method, side):
-    """A run of many disks stops quickly, in whichever part of the program the signal arrives."""
+    """A run of many disks stops quickly, wherever in the program the signal arrives."""
     text = f"""&run {method} /
     &species grid = {side}, {side} packing_fraction = 0.3 temperature = 1 /
     &stop events = 1000000000 /"""
@@ -309,7 +309,7 @@ def test_many_disks_stop_in_time(started, tmp_path, method, side):
 
 
 def test_a_stuck_summary_does_not_keep_a_finished_run(started, tmp_path):
-    """A run ends even if the process that reads its standard output has stopped reading."""
+    """A run ends even if the reader of its standard output has stopped reading."""
     write_input(tmp_path, "&species count = 10 radius = .01 / &stop time = 1 /")
     with filled_pipe() as inlet:
         process = started("gas.nml", "-o", "gas.h5", stdout=inlet)
@@ -319,7 +319,7 @@ def test_a_stuck_summary_does_not_keep_a_finished_run(started, tmp_path):
 
 
 def test_ignored_signals_stay_ignored(program, tmp_path):
-    """A run that ignores signals, for example one started with nohup, continues after a signal."""
+    """A run started with nohup, for example, continues after a signal."""
     write_input(tmp_path, BUSY)
     command = ["nohup", program, "gas.nml", "-o", "gas.h5"]
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -395,7 +395,7 @@ def test_of_twins_started_at_once_one_runs(started, ricochet, tmp_path):
 def test_a_full_disk_costs_nothing(ricochet, tmp_path, small_disk, text, sizes):
     """No data are lost if a file system of 64 kB to 4 MB is full.
 
-    With more space the run continues.
+    The run continues when there is more space.
     """
     write_input(tmp_path, text)
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
@@ -442,7 +442,7 @@ def test_a_limit_of_the_process_is_named(program, tmp_path, limit, left):
 
 
 def test_a_disk_for_reading_only_is_left_as_it_is(ricochet, tmp_path, small_disk):
-    """Files on a read-only file system are not changed, and the message names the reason."""
+    """Files on a read-only file system are unchanged, and the message gives the reason."""
     write_input(tmp_path, MIXTURE)
     folder = small_disk(4000)
     stopped = ["gas.nml", "-o", "disk/gas.h5", "--set", "stop.wall_clock=1e-9"]
@@ -486,7 +486,7 @@ LOGGING = """&species count = 200 radius = 0.01 speed = 1 /
 def test_the_event_log_and_the_final_copy_are_planned(
     output, stop, planned, words, ricochet, tmp_path, small_disk
 ):
-    """A run that is refused needs at least the stated room, also for the copy at its end."""
+    """A refused run needs at least the stated space, including the copy at its end."""
     write_input(tmp_path, LOGGING.format(output, stop))
     copies = 2 if any("copy" in word for word in words) else 1
     small_disk(copies * planned * 9 // 10240)
@@ -505,7 +505,7 @@ def test_the_event_log_and_the_final_copy_are_planned(
 
 
 def start_long(started, folder, *options):
-    """Start a long run, and return its process after several frames have been written."""
+    """Start a long run, and return its process once several frames have been written."""
     write_input(folder, BUSY)
     process = started("gas.nml", "-o", "gas.h5", *LONG, *options)
     wait_for(lambda: frames_in(folder / "gas.h5.part") > 10)

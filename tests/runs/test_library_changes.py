@@ -14,7 +14,7 @@ from whole_runs import ran
 
 
 def test_the_table_says_what_may_change_in_a_running_simulation(program):
-    """A variable that the table does not mark as changeable is refused for this reason."""
+    """A variable not marked as changeable in the table is refused for this reason."""
     table = json.loads(ran(program, "--print-variables", check=True).stdout)
     system = GAS + "&side name = 'top' / &wall name = 'w' from = 0.4, 0.5 to = 0.6, 0.5 /"
     system += "&obstacle name = 'o' centre = 0.5, 0.5 radius = 0.01 /"
@@ -34,7 +34,7 @@ def test_the_table_says_what_may_change_in_a_running_simulation(program):
 
 
 def test_a_saved_simulation_goes_on_in_the_program_and_back(program, tmp_path, whole):
-    """The final state is bit-identical to the final state of an uninterrupted run."""
+    """The final state is bit-identical to that of an uninterrupted run."""
     (tmp_path / "gas.nml").write_text(GAS)
     Simulation(GAS).advance(events=150).save(tmp_path / "gas.h5")
     with pytest.raises(ProgramError, match="exists already"):
@@ -49,7 +49,7 @@ def test_a_saved_simulation_goes_on_in_the_program_and_back(program, tmp_path, w
 
 
 def test_a_side_is_held_moved_and_released_where_it_is():
-    """The energy balance holds, and the saved input contains the position of the side."""
+    """The energy balance holds, and the saved input gives the position of the side."""
     side = "side.right"
     system = {
         "box": {"upper": [2, 1]},
@@ -97,7 +97,7 @@ MOTIONS = {
 @pytest.mark.parametrize("new", MOTIONS)
 @pytest.mark.parametrize("former", MOTIONS)
 def test_a_new_motion_drops_the_variables_of_the_former_one(former, new):
-    """Only variables that the same change sets are reported if they have no effect."""
+    """Only variables set by the same change are reported if they have no effect."""
     system = {"side": {"name": "right", "motion": former} | MOTIONS[former]}
     system["species"] = {"count": 5, "radius": 0.02, "temperature": 1}
     change = {f"side.right.{name}": value for name, value in MOTIONS[new].items()}
@@ -135,7 +135,7 @@ def test_a_piston_is_held_by_its_motion_alone(program, tmp_path, monkeypatch):
 def test_a_saved_simulation_needs_room_for_what_is_written_only(
     schedule, program, tmp_path, monkeypatch
 ):
-    """Its file grows when the program continues the run, to the file of an undisturbed run."""
+    """When the program continues the run, the file grows to that of an undisturbed run."""
     monkeypatch.chdir(tmp_path)
     text = "&species count = 50 radius = 0.01 speed = 1 /\n&stop time = 0.9 /\n"
     text += f"&output {schedule} /\n"
@@ -152,7 +152,7 @@ def test_a_saved_simulation_needs_room_for_what_is_written_only(
 
 
 def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypatch):
-    """The program continues with the saved input, and refuses the initial input."""
+    """The program continues with the saved input, and refuses the initial one."""
     monkeypatch.chdir(tmp_path)
     Path("gas.nml").write_text(GAS)
     gas = Simulation("gas.nml", {"run.seed": 5}).advance(events=50)
@@ -204,7 +204,7 @@ def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypa
     ],
 )
 def test_a_simulation_needs_no_stop(groups, program, tmp_path, monkeypatch):
-    """A simulation in memory needs no stop rule; the program can continue it with a stop rule."""
+    """A simulation in memory needs no stop condition; with one, the program can continue it."""
     monkeypatch.chdir(tmp_path)
     system = {"species": {"name": "a", "count": 20, "radius": 0.01, "speed": 1}} | groups
     box = Simulation(system).advance(time=0.25)
@@ -219,7 +219,7 @@ def test_a_simulation_needs_no_stop(groups, program, tmp_path, monkeypatch):
 
 
 def test_an_input_is_saved_over_nothing_but_a_saved_one(tmp_path, monkeypatch):
-    """An input is saved only over a file that was saved before, which is checked in advance."""
+    """Only a file saved earlier is replaced, which is checked in advance."""
     monkeypatch.chdir(tmp_path)
     gas = Simulation(GAS)
     Path("mine.nml").write_text("! my comments\n")
@@ -244,7 +244,7 @@ def test_an_input_is_saved_over_nothing_but_a_saved_one(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", ["side.surface_velocity", "Side.left.Surface_Velocity"])
 def test_a_change_takes_effect_however_its_variable_is_written(name):
-    """A name without the name of its only group, and a name in capital letters, are accepted."""
+    """Capital letters are accepted, and names without that of their only group."""
     hot = {"name": "left", "temperature": 1, "surface_velocity": 1}
     gas = Simulation({"side": hot, "species": {"count": 5, "radius": 0.02, "speed": 1}})
     assert gas.change({name: 1}).changes == []
@@ -264,7 +264,7 @@ def test_one_element_of_a_vector_can_change():
 
 @pytest.mark.parametrize("kind", ["obstacle", "wall", "species"])
 def test_a_file_that_has_changed_moves_no_obstacle(tmp_path, monkeypatch, kind):
-    """Changes and saved files read the input again; they are refused if its files have changed."""
+    """Changes and saved files read the input again, and are refused if its files have changed."""
     monkeypatch.chdir(tmp_path)
     rows = {"obstacle": "x y radius\n0.3 0.3 0.05\n", "wall": "x1 y1 x2 y2\n0.3 0.3 0.4 0.4\n"}
     rows["species"] = "x y vx vy radius\n0.3 0.3 1 0 0.05\n0.6 0.6 0 1 0.05\n"

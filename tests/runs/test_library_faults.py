@@ -1,4 +1,4 @@
-"""Wrong use, interrupts, processes and memory: the library never ends the process that uses it."""
+"""Wrong use, interrupts, processes and memory: the library never ends the calling process."""
 
 import gc
 import os
@@ -23,7 +23,7 @@ SHEARED |= {"species": {"count": 1, "radius": 0.1}}
 
 
 def test_handles_share_nothing_and_give_all_back():
-    """Simulations are independent, and all memory is released, also for invalid inputs."""
+    """Simulations are independent, and all memory is released, even for invalid inputs."""
     one, other = Simulation(GAS), Simulation(GAS, {"run.seed": 2})
     for k in range(1, 21):
         one.advance(events=10 * k)
@@ -46,7 +46,7 @@ def test_handles_share_nothing_and_give_all_back():
 
 
 def test_an_interrupt_leaves_the_simulation_whole():
-    """Ctrl-C raises an exception quickly, and the simulation can then continue unchanged."""
+    """Ctrl-C raises an exception quickly, and the simulation can continue unchanged."""
     gas = Simulation(GAS, ENDLESS)
     timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
     timer.start()
@@ -61,7 +61,7 @@ def test_an_interrupt_leaves_the_simulation_whole():
 
 
 def test_other_threads_of_python_run_meanwhile():
-    """Other Python threads run during `advance`, because the interpreter lock is released."""
+    """`advance` releases the interpreter lock, so that other Python threads run."""
     gas, counted, events = Simulation(GAS, ENDLESS), 0, 10**4
     while counted <= 10:  # until one call takes long enough
         counted, events = 0, 2 * events
@@ -141,7 +141,7 @@ def kept(system) -> Simulation:
     ],
 )
 def test_wrong_use_is_said_in_one_line(act, error, words, tmp_path, monkeypatch):
-    """Wrong use raises an exception with one line; other simulations continue."""
+    """Wrong use raises an exception with a one-line message; other simulations continue."""
     monkeypatch.chdir(tmp_path)
     gas = Simulation(GAS)
     with pytest.raises(error, match=re.escape(words)) as caught:
@@ -151,7 +151,7 @@ def test_wrong_use_is_said_in_one_line(act, error, words, tmp_path, monkeypatch)
 
 
 def test_a_simulation_that_breaks_off_says_so():
-    """A simulation that has failed raises the message of the program at every further call."""
+    """A failed simulation raises the message of the program at every further call."""
     words = """&box gravity = 0, -1 /
     &species count = 1 radius = 0.1 position = 0.5, 0.5 velocity = 0, 0 /
     &contact wall_restitution = 0 /
@@ -164,7 +164,7 @@ def test_a_simulation_that_breaks_off_says_so():
 
 
 def test_files_that_are_refused_leave_no_memory_behind(tmp_path):
-    """Refused files (missing, damaged or foreign) do not cause memory leaks."""
+    """Missing, damaged or foreign files cause no memory leaks."""
     places = [tmp_path / name for name in ("none.h5", "text.h5", "other.h5", "old.h5", "cut.h5")]
     places[1].write_text("not HDF5")
     with h5py.File(places[2], "w") as file:
@@ -189,7 +189,7 @@ def test_files_that_are_refused_leave_no_memory_behind(tmp_path):
 
 
 def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
-    """For any damaged bits the message consists of one line."""
+    """Whatever bits are damaged, the message is a single line."""
     text = GAS.replace("event_log = .true.", "")  # which is allocated as a whole
     path = Simulation(text).save(tmp_path / "gas.h5")
     whole = path.read_bytes()
@@ -204,7 +204,7 @@ def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
 
 
 def test_a_fork_and_an_interpreter_that_ends_do_no_harm():
-    """A child process continues independently, and the interpreter can end during `advance`."""
+    """A child process continues independently, and the interpreter may end during `advance`."""
     script = f"""
 import os, threading
 from ricochet import Simulation

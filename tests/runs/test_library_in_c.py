@@ -16,7 +16,7 @@ from whole_runs import ran
 
 
 def test_numbers_that_c_may_give_are_refused_or_count_as_none():
-    """The header file describes these numbers, which the Python package never passes."""
+    """The header describes these numbers, which the Python package never passes."""
     engine, gas, room = library(), Simulation(GAS), 200
     message = ctypes.create_string_buffer(room)
     with gas._open() as handle:
@@ -36,7 +36,7 @@ def test_numbers_that_c_may_give_are_refused_or_count_as_none():
     assert gas.advance(events=9).events == 9 and np.isfinite(gas.velocity).all()
 
 
-#: Arguments that a caller in C may pass, valid or invalid.
+#: Arguments, valid or invalid, that a caller in C may pass.
 NUMBERS = np.nan, np.inf, -np.inf, -1.0, 0.0, 0.1, 0.3, 1e-300, 1e100, 1e308
 COUNTS = -(2**31), -5, -1, 0, 1, 5, 60, 500
 SETTINGS = (

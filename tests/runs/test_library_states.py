@@ -1,7 +1,7 @@
 """A simulation in memory: its state, its events, copies of it, and the time that it reaches.
 
 `test_random_systems.py` tests with random systems that advancing in small steps, saving and loading
-do not change the results.
+do not affect the results.
 """
 
 import copy
@@ -42,7 +42,7 @@ def test_a_simulation_shows_what_the_file_of_its_run_has(whole):
 
 
 def test_arrays_are_read_only_and_are_assigned_whole():
-    """Arrays are read-only copies; a complete array can be assigned."""
+    """Arrays are read-only copies, to which complete arrays can be assigned."""
     with Simulation(GAS) as gas:
         for name in {*COLUMNS} & {*dir(gas)}:
             array = getattr(gas, name)
@@ -86,7 +86,7 @@ def states(*simulations):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_copy_and_a_pickle_continue_with_the_same_bits(seed):
-    """Copies and pickles of a simulation continue independently with bit-identical results."""
+    """They continue independently, with bit-identical results."""
     random.seed(seed)
     gas = Simulation(GAS, {"run.seed": seed}, threads=1 + seed)
     gas.advance(events=random.randrange(300))
@@ -112,7 +112,7 @@ def test_a_copy_and_a_pickle_continue_with_the_same_bits(seed):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_each_event_is_reported_in_the_state_of_its_moment(whole, threads):
-    """The reported events are equal to the event log, and reporting does not change the motion."""
+    """The reported events are those of the event log, and reporting does not affect the motion."""
     log, seen = whole.event_log(), []
 
     def see(event):
@@ -182,7 +182,7 @@ def test_a_function_of_events_may_stop_and_change_the_simulation():
 
 @pytest.mark.parametrize("boundary", ["wall", "periodic"])
 def test_positions_are_set_and_their_energy_is_work(boundary):
-    """After positions are set, the simulation continues as if it had started with them."""
+    """The simulation continues as if it had started with these positions."""
     gas = Simulation(GAS, {"box.boundary": [boundary, "wall"], **ENDLESS}).advance(events=77)
     gas.position = before = gas.position
     assert gas.changes == []
@@ -216,7 +216,7 @@ def test_a_moved_disk_keeps_the_periods_that_it_has_crossed():
 
 
 def test_a_moment_where_a_slice_has_ended_is_reached_again():
-    """A simulation that is advanced in one call reaches the same state to the last bit."""
+    """A simulation advanced in one call reaches the same state to the last bit."""
     text = "&box boundary = 'periodic', 'periodic' /\n&species name = 'a' count = 200"
     text += " packing_fraction = 0.6 placement = 'dense' temperature = 1 /\n"
     with Simulation(text) as one, Simulation(text) as other:
@@ -228,7 +228,7 @@ def test_a_moment_where_a_slice_has_ended_is_reached_again():
 
 
 def test_a_simulation_reaches_each_representable_time():
-    """If rounding errors kept the simulation before the requested time, `advance` would not end."""
+    """If rounding kept the simulation before the requested time, `advance` would not end."""
     for seed in range(1, 251):
         rng = random.Random(seed)
         few = {"species": {"count": 5, "radius": 0.05, "temperature": 1}, "run": {"seed": seed}}

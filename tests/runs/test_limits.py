@@ -24,7 +24,7 @@ def memory_of(program, tmp_path):
     """Return a function that measures the memory of a run of an input [bytes].
 
     A small process starts the program, because a program inherits the maximum memory size of its
-    parent process.
+    parent.
     """
 
     def run(text, *words) -> int:
@@ -99,7 +99,7 @@ def test_whatever_the_limit_of_memory_the_result_is_right_or_one_line(
 
 @pytest.mark.parametrize("count", [10**8, 10**9, 10**12])
 def test_a_file_that_declares_absurdly_many_disks_is_refused_at_once(ricochet, tmp_path, count):
-    """A file with an absurd number of disks is refused immediately; its datasets are empty."""
+    """The datasets of the file are empty."""
     with h5py.File(tmp_path / "many.h5", "w") as file:
         species = {"shape": (count,), "dtype": "i4", "chunks": (2**20,)}
         file.create_dataset("particles/disks/species", **species)
@@ -118,7 +118,7 @@ def test_a_file_that_declares_absurdly_many_disks_is_refused_at_once(ricochet, t
 
 
 def test_the_memory_of_a_run_does_not_grow(memory_of):
-    """The memory does not grow when samples, sorting and checkpoints allocate arrays."""
+    """This holds although samples, sorting and checkpoints allocate arrays."""
     text = "&box upper = 1000, 0.001 / " + GAS.format(count=1000, collisions=10**9)
     words = ("species.gas.packing_fraction=1e-4", "output.checkpoint_every=1e-9")
     words += ("output.observables_every_events=1",)  # at least one checkpoint per sample
@@ -149,11 +149,11 @@ placement = 'lattice' velocities = 'maxwell' /
     ],
 )
 def test_a_run_takes_the_memory_that_is_assumed(memory_of, ricochet, count, length, words):
-    """The memory of the disks agrees with the estimate in runs with and without domains.
+    """The memory of the disks agrees with the estimate, with and without domains.
 
     The memory of a run of 100 disks is subtracted from both, because the libraries of one system
-    need twice as much memory as those of another.  The run of 10^6 disks, the smallest with
-    domains, uses 6 s.
+    need twice as much memory as those of another. The run of 10^6 disks, the smallest with domains,
+    takes 6 s.
     """
     measured, assumed = [], []
     for disks in (count, 100):
@@ -163,7 +163,7 @@ def test_a_run_takes_the_memory_that_is_assumed(memory_of, ricochet, count, leng
 
 
 def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path):
-    """The output has two frames of 36 bytes, 24 bytes and two checkpoints of 72 bytes per disk."""
+    """Per disk, the output has two frames of 36 bytes, 24 bytes and two checkpoints of 72 bytes."""
     (tmp_path / "gas.nml").write_text(GAS.format(count=1_000_000, collisions=1))
     grid = ["--set", "species.gas.count=", "--set", "species.gas.grid=1000,1000"]
     run = ricochet("gas.nml", "--check", *grid)
@@ -190,7 +190,7 @@ def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path)
     ],
 )
 def test_a_run_uses_no_more_memory_than_is_foretold(memory_of, words, count):
-    """The memory is at most 410 bytes per disk and 25 MB, as estimated in `start/memory`."""
+    """The limit is 410 bytes per disk and 25 MB, the estimate of `start/memory`."""
     text = GAS.format(count=count, collisions=1000)
     used = memory_of(text, "output.frames_every_collisions=500", *words.split())
     assert 0.4 < used / (410 * count + 25e6) < 1
@@ -199,7 +199,7 @@ def test_a_run_uses_no_more_memory_than_is_foretold(memory_of, words, count):
 @pytest.mark.check
 @pytest.mark.parametrize("threads", [1, 2])
 def test_domains_use_at_most_275_bytes_per_disk(memory_of, threads):
-    """In addition to 275 bytes per disk and the samples, the program may use 25 MB."""
+    """In addition to these and the samples, the program may use 25 MB."""
     text = GAS.format(count=500_000, collisions=2_500_000)
     assert memory_of(text, f"run.threads={threads}") < 275 * 500_000 + 25e6
 

@@ -25,7 +25,7 @@ POINTS = [(1, 1), (2, 1.5), (2, 2.5), (1, 1)]
 
 
 def scatterers() -> np.ndarray:
-    """Return circles (n, 3), some of which overlap."""
+    """Return circles (n, 3), some of them overlapping."""
     rng = np.random.default_rng(4)
     cells = np.stack(np.meshgrid(*2 * [np.arange(SIDE) + 0.5]), axis=-1).reshape(-1, 2)
     places = cells + rng.uniform(-0.4, 0.4, cells.shape)
@@ -47,7 +47,7 @@ def table(names: str, rows: np.ndarray) -> str:
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Write inputs with equal obstacles, as groups of many obstacles and as single obstacles."""
+    """Write inputs with the same obstacles, in groups of many and one by one."""
     (tmp_path / "circles.txt").write_text(table("x y radius", scatterers()))
     (tmp_path / "walls.txt").write_text(table("X1 y1 x2 y2", walls()))
     points = ", ".join(f"{x}, {y}" for x, y in POINTS)
@@ -76,7 +76,7 @@ def test_obstacles_of_a_file_are_met_as_if_each_had_a_group(program, folder):
         ):
             assert np.array_equal(many[name][()], single[name][()])
         codes = many["events/j"][()]
-        assert codes.min() < -4 - len(scatterers())  # walls, too
+        assert codes.min() < -4 - len(scatterers())  # including walls
         sums = many["observables"]["obstacles" if "obstacles" in many["observables"] else "walls"]
         assert set(sums) == {"circles", "last", "triangle", "lines"}
         hits = sum(int(sums[name]["collisions/value"][-1]) for name in sums)

@@ -9,7 +9,7 @@ from ricochet import Simulation, read_run
 from synthetic_run import ROOT
 from whole_runs import ran
 
-RADIUS = 1e-9  #: of point-like disks, which hardly ever meet
+RADIUS = 1e-9  #: of point-like disks, which hardly ever collide
 
 
 def namelist(*groups: str) -> str:
@@ -23,8 +23,9 @@ def namelist(*groups: str) -> str:
 def inside_half_space(t: float, length: float) -> float:
     """Return the fraction of free particles with kT = m = 1 that are still in [0, length].
 
-    They start uniformly, are reflected at 0 and leave at `length`.  Unfolded at 0, a particle of
-    speed u leaves before t if it starts within u t of the end of an interval of twice the length.
+    They start uniformly distributed, are reflected at 0 and leave at `length`. Unfolded at 0, a
+    particle of speed u leaves before t if it starts within u t of the end of an interval of twice
+    the length.
     """
     a = t / (2 * length)
     return math.erf(1 / (a * math.sqrt(2))) - a * math.sqrt(2 / math.pi) * -math.expm1(-0.5 / a**2)
@@ -55,7 +56,7 @@ def test_an_ideal_gas_flows_out_of_its_box(dynamics):
 def test_a_row_of_rods_leaves_like_points_behind_a_line_that_recedes():
     """In the coordinates x_i - 2 i r, rods are points, and the last of k leaves at L - 2 (k - 1) r.
 
-    This is exact at all densities.  Points of equal mass pass through each other, and are reflected
+    This is exact at all densities. Points of equal mass pass through each other, and are reflected
     at the closed end.
     """
     rng = np.random.default_rng(5)
@@ -85,9 +86,9 @@ def test_a_row_of_rods_leaves_like_points_behind_a_line_that_recedes():
 
 
 def open_gas(disks: int, radius: float, door: float, seed: int) -> str:
-    """Return a gas between hot walls; disks that leave through a small door enter again.
+    """Return a gas between hot walls, in which disks that leave through a small door enter again.
 
-    The centres of disks pass a door of the given width, between the ends of two walls.
+    Disk centres pass a door of the given width between the ends of two walls.
     """
     half = radius + door / 2
     return namelist(
@@ -105,9 +106,9 @@ def density_at_door(disks: float, radius: float) -> float:
     """Return the density of centres on the line of the door, to second order in the density.
 
     The density of centres is the activity, n (1 + pi s^2 n) in the middle of a gas of diameter s,
-    times the probability that a disk inserted there overlaps with no other.  On the line, which is
-    s/2 outside of the region of the other centres, it can overlap with centres in a segment only.
-    At the other walls the density has an excess of (2/3) n^2 s^3 per length for the same reason.
+    times the probability that a disk inserted there overlaps with no other. On the line, which is
+    s/2 outside the region of the other centres, it can overlap only with centres in a segment. At
+    the other walls the density has an excess of (2/3) n^2 s^3 per length for the same reason.
     """
     s, edge = 2 * radius, 1 - 2 * radius
     area, excess = edge**2, 4 * edge * 2 / 3 * s**3
@@ -139,10 +140,10 @@ def test_a_gas_flows_through_a_small_opening(disks, radius, door, time):
 
 
 def escapes_from_circle(x: np.ndarray, v: np.ndarray, door: float, until: float) -> np.ndarray:
-    """Return the times at which points with speed 1 pass the door of a unit circle, else infinity.
+    """Return when points with speed 1 pass the door of a unit circle (infinity if never).
 
-    The door is an arc of the given length around the angle 0.  The angle of the position increases
-    by the same amount in each bounce.
+    The door is an arc of given length around the angle 0. Each bounce increases the polar angle by
+    the same amount.
     """
     along = np.sum(x * v, axis=1)
     time = -along + np.sqrt(along**2 + 1 - np.sum(x**2, axis=1))
@@ -177,7 +178,7 @@ def circle(disks: int, door: float, seed: int) -> tuple[Simulation, np.ndarray, 
 
 
 def test_disks_escape_from_a_circle_at_the_times_of_free_points():
-    """A departure from the box follows the passage of the door at a known distance."""
+    """A disk departs from the box at a known distance behind the door."""
     door, until = 0.3, 30
     box, x, v = circle(300, door, 2)
     exact = escapes_from_circle(x, v, door, until)
@@ -200,7 +201,7 @@ def test_disks_escape_from_a_circle_at_the_times_of_free_points():
 def test_a_circle_empties_as_a_power_law_and_a_stadium_exponentially(program, tmp_path):
     """Late survivors of a circle: 2/(door t), Bunimovich and Dettmann, PRL 94, 100201 (2005).
 
-    In a chaotic billiard of the area A they decay with the mean time pi A/(w v) for small doors.
+    In a chaotic billiard of area A they decay with the mean time pi A/(w v) for small doors.
     """
     disks, door = 4000, 0.2
     box, x, v = circle(disks, door, 4)
@@ -220,9 +221,10 @@ def test_a_circle_empties_as_a_power_law_and_a_stadium_exponentially(program, tm
 
 
 def test_a_source_and_an_open_side_reach_a_stationary_number():
-    """The mean number inside is the rate of the source times the mean stay, and its variance.
+    """The mean number inside, and its variance, are the rate of the source times the mean stay.
 
-    All disks fly with the same velocity, so that each stay is its distance from the open side.
+    All disks have the same velocity, so that each stay is determined by the distance from the open
+    side.
     """
     interval, length, start = 0.01, 2.0, 1.0
     gas = Simulation(
@@ -235,7 +237,7 @@ def test_a_source_and_an_open_side_reach_a_stationary_number():
     )
     inside = [gas.advance(time=2.005 + 0.5 * k).observable("inside") for k in range(200)]
     age = 0.005 + interval * np.arange(200)
-    stays = np.clip((length - age) / start, 0, 1)  # probability to be inside at this age
+    stays = np.clip((length - age) / start, 0, 1)  # probability of being inside at this age
     mean, variance = stays.sum(), np.sum(stays * (1 - stays))
     assert mean == pytest.approx((length - start / 2) / interval, rel=1e-9)
     assert abs(np.mean(inside) - mean) < 4 * math.sqrt(variance / 50)

@@ -33,7 +33,7 @@ BASE = "&box upper = 2, 1 /\n&side name = 'right' open = .true. /\n"
 
 @pytest.fixture(scope="module")
 def whole(program, tmp_path_factory):
-    """Perform the run of GAS with the serial engine."""
+    """Execute the run of GAS with the serial engine."""
     folder = tmp_path_factory.mktemp("open")
     (folder / "gas.nml").write_text(GAS)
     ran(program, "gas.nml", "-o", "gas.h5", cwd=folder, check=True)
@@ -64,7 +64,7 @@ def test_free_disks_leave_at_exact_times(tmp_path, program):
 
 
 def test_numbers_and_energy_balance(whole):
-    """Disks are conserved exactly, and energy to rounding errors of its largest term."""
+    """Disks are conserved exactly, energy up to rounding errors of its largest term."""
     run = contents(whole)
     values = {
         name.removeprefix("/observables/").removesuffix("/value"): value
@@ -92,7 +92,7 @@ def test_numbers_and_energy_balance(whole):
     ["run.search=pairs", "run.search=rescan", "run.queue=heap", "run.threads=3", "stop.events=300"],
 )
 def test_all_engines_and_a_resumed_run_agree(whole, program, tmp_path, setting):
-    """The output does not depend on search, queue and threads, nor on an interruption."""
+    """The output depends neither on search, queue and threads nor on an interruption."""
     (tmp_path / "gas.nml").write_text(GAS)
     ran(program, "gas.nml", "-o", "b.h5", f"--set={setting}", cwd=tmp_path, check=True)
     if setting.startswith("stop"):
@@ -106,7 +106,7 @@ def test_all_engines_and_a_resumed_run_agree(whole, program, tmp_path, setting):
 
 
 def test_a_simulation_in_memory_has_the_same_course(whole, tmp_path):
-    """Steps, copies, pickles and saved files do not change a simulation."""
+    """Steps, copies, pickles and saved files do not affect a simulation."""
     gas = Simulation(GAS).advance(events=100).copy()
     gas = pickle.loads(pickle.dumps(gas.advance(time=0.5)))
     gas.save(tmp_path / "gas.h5")
@@ -119,7 +119,7 @@ def test_a_simulation_in_memory_has_the_same_course(whole, tmp_path):
 
 
 def test_sides_open_and_close_in_memory():
-    """A lid opens and closes; a disk on its line, and a run without a lid, refuse."""
+    """A lid opens and closes; it is refused if a disk is on its line, or for a run without lids."""
     gas = Simulation(
         BASE + "&species radius = 0.05 position = 0.5, 0.5, 1, 0.5, 1.5, 0.5 velocity = 1, 0 /"
     )
@@ -165,7 +165,7 @@ def test_start_and_end_of_a_source_are_inclusive(interval, start, end, actions):
 
 
 def test_a_source_without_room_inserts_as_many_disks_as_fit():
-    """The remaining disks try again at the next times, also after the room is free."""
+    """The others try again at the next times, including after space has become free."""
     gas = Simulation(
         "&box upper = 2, 1 /\n&species count = 20 waiting = 20 radius = 0.1 /\n&source name = 's' "
         "interval = 0.1 count = 20 velocity = 0, 0 region = 0, 0.3, 0, 0.3 /"

@@ -1,7 +1,6 @@
 """Output files of runs: layout, parameters, sampling schedules and refused paths.
 
-The correctness of the numbers is tested with random systems in test_random_systems.py, and in
-tests/unit/.
+The numbers themselves are tested with random systems in test_random_systems.py, and in tests/unit/.
 """
 
 import re
@@ -23,7 +22,7 @@ GRAVITY = """&box upper = 2, 3  boundary = 'periodic', 'wall'  gravity = 0, -2 /
 
 @pytest.fixture
 def ran(ricochet, tmp_path):
-    """Return a function that performs a run and returns the open output file."""
+    """Return a function that executes a run and returns the open output file."""
     opened = []
 
     def run(text, *options, name="gas"):
@@ -134,7 +133,7 @@ def test_the_origin_is_there(ran):
     ],
 )
 def test_samples_are_at_the_very_multiples_and_at_the_end(ran, track, cadence, end, expected):
-    """A schedule on the command line replaces the schedule of the same samples in the input."""
+    """A schedule on the command line replaces that of the same samples in the input."""
     file = ran(MIXTURE, f"--set=output.{track}_{cadence}", "--set=stop.time=", f"--set=stop.{end}")
     disks, seen = file["particles/disks"], file["observables"]
     times, number = disks["position/time"][:], seen["collisions/value"][:]
@@ -162,7 +161,7 @@ COLUMNS = "velocity", "event_count", "image", "angular_velocity", "orientation"
 
 @pytest.mark.parametrize("wanted", [["position"], COLUMNS[:1], COLUMNS[1:4:2], COLUMNS])
 def test_frames_have_the_columns_that_are_asked_for(ran, wanted):
-    """Frames contain positions and the requested columns; all other data do not change."""
+    """Frames contain positions and the requested columns; all other data are the same."""
     whole = ran(TURNING, name="whole")["particles/disks"]
     words = ", ".join(f"'{name}'" for name in wanted)
     part = ran(TURNING, f"--set=output.frame_columns={words}", name="part")["particles/disks"]
@@ -194,7 +193,7 @@ def test_counts_in_frames_grow_longer_where_they_must(ricochet, tmp_path, cut):
 
 
 def test_the_same_input_gives_the_same_bytes(ran, tmp_path):
-    """Two runs of an input write equal files, except for two numbers about the computing time."""
+    """Two runs of an input write equal files, except for two numbers on the computing time."""
     every = ["--set", "output.frames_every_time=", "--set", "output.frames_every_events=7"]
     ran(MIXTURE, *every, name="one").close()
     time.sleep(1.1)  # a second later: no time stamps
@@ -276,7 +275,7 @@ def test_impossible_places_are_refused_in_one_line(ricochet, tmp_path):
 
 
 def test_a_species_has_no_name_that_the_file_uses_itself(ricochet, ran, tmp_path):
-    """A species cannot have a name that another object of the same HDF5 group has."""
+    """A species cannot be named like another object of the same HDF5 group."""
     file = ran(MIXTURE)
     used = {*file["observables"], *file["parameters/species"]} - {"light", "heavy"}
     assert {"all", "committed", "momentum", "names", "counts"} < used
@@ -289,7 +288,7 @@ def test_a_species_has_no_name_that_the_file_uses_itself(ricochet, ran, tmp_path
 
 
 def test_a_file_that_was_rebuilt_lacks_nothing(ran, tmp_path):
-    """A file is rebuilt only if the stop rule does not determine its number of samples."""
+    """A file is rebuilt only if the stop condition does not determine its number of samples."""
     planned = ["--set", "output.event_log=.false."]
     ran(GRAVITY, *planned, name="planned").close()
     ran(GRAVITY, *planned, "--set", "stop.collisions=1000000000", name="rebuilt").close()

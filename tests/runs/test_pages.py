@@ -1,13 +1,13 @@
-"""Tests of the code on the pages of docs/: each fenced block is executed in the order of the page.
+"""Tests of the code on the pages of docs/: fenced blocks are executed in the order of the page.
 
-A block of the language `fortran` whose first line is a comment `! runs/NAME.nml: ...` is written to
-this file, and so is a block of the language `c` that begins with `// runs/NAME.c: ...`.  Blocks of
-the language `bash` are executed in a folder that looks like the project, and all blocks of the
-language `python` of a page form one program, which is executed at the end.  Blocks of the language
-`text` show output and are not executed.
+- `fortran` whose first line is a comment `! runs/NAME.nml: ...`, and `c` that begins with `//
+  runs/NAME.c: ...`: written to this file
+- `bash`: executed in a folder that looks like the project
+- `python`: all blocks of a page form one program, executed at the end
+- `text`: output, not executed
 
-A comment `<!-- test: OLD => NEW; OLD => NEW -->` before a block replaces texts in the block, so
-that a long run becomes a short one.  The comment `<!-- test: not run, REASON -->` excludes a block.
+A comment `<!-- test: OLD => NEW; OLD => NEW -->` before a block replaces texts in it, so that a
+long run becomes a short one. `<!-- test: not run, REASON -->` excludes a block.
 """
 
 import contextlib
@@ -29,9 +29,9 @@ from whole_runs import environment, ran
 BLOCK = re.compile(
     r"^(?:<!-- test: (?P<note>.*?) -->\n+)?```(?P<language>\w*)\n(?P<code>.*?)^```$", re.M | re.S
 )
-#: The first line of a block that is written to a file, by language.
+#: First line of a block that is written to a file, by language.
 FIRST_LINE = {"fortran": r"! (runs/[\w-]+\.nml)\b", "c": r"// (runs/[\w-]+\.c)\b"}
-#: A command that runs a script of post/.
+#: Command that runs a script of post/.
 SCRIPT = re.compile(r"(?:\.venv/bin/)?python post/(\w+)\.py(.*)")
 LANGUAGES = {"bash", "python", "fortran", "text", "diff", "mermaid", "c"}
 PAGES = [path for path in sorted(ROOT.glob("docs/*/*.md")) if "```" in path.read_text()]
@@ -51,7 +51,7 @@ LONG = {
 
 
 class Block(NamedTuple):
-    """A block of code of a page, as it is executed."""
+    """Block of code on a page, as executed."""
 
     language: str
     code: str
@@ -60,7 +60,7 @@ class Block(NamedTuple):
 def blocks_of(page: str, short: bool = True) -> list[Block]:
     """Return the blocks of a page that are executed.
 
-    Texts are replaced for the test, unless `short` is false.
+    Texts are replaced for the test unless `short` is False.
     """
     found = []
     for one in BLOCK.finditer(page):
@@ -76,13 +76,13 @@ def blocks_of(page: str, short: bool = True) -> list[Block]:
 
 
 def libraries(program: Path) -> list[Path]:
-    """Return the libraries that the tests use."""
+    """Return the libraries used by the tests."""
     folder = Path(os.environ.get("RICOCHET_LIBRARY", program.parent))
     return sorted(folder.glob("libricochet*.so"))
 
 
 def make_project(folder: Path, program: Path) -> None:
-    """Make a folder that looks like the project to the commands of a page."""
+    """Make a folder that looks like the project to the commands on a page."""
     (folder / "runs").mkdir()
     (folder / "build").mkdir()
     for made in (program, *libraries(program)):
@@ -94,7 +94,7 @@ def make_project(folder: Path, program: Path) -> None:
 
 
 def run_shell(code: str) -> None:
-    """Execute shell commands; scripts run in this process, which has loaded their packages.
+    """Execute shell commands, with scripts in this process, which has loaded their packages.
 
     A block with loops or variables is executed by bash as a whole.
     """
@@ -127,14 +127,14 @@ def execute(blocks: list[Block], folder: Path, program: Path) -> None:
 
 
 def marked(page: Path):
-    """Return a parameter of a test; the mark excludes a long page from `make test`."""
+    """Return a parameter of a test, with a mark that excludes a long page from `make test`."""
     name = f"{page.parent.name}/{page.stem}"
     return pytest.param(page, id=name, marks=[pytest.mark.statistics] * (page.stem in LONG))
 
 
 @pytest.mark.parametrize("page", [*map(marked, RUN)])
 def test_the_code_of_a_page_works(page, program, tmp_path):
-    """The longest pages use about ten seconds, because they simulate and draw a dozen runs."""
+    """The longest pages take about ten seconds, because they simulate and draw a dozen runs."""
     text = page.read_text()
     if "libricochet" in text and not libraries(program):
         pytest.skip("make library builds it")
@@ -145,14 +145,14 @@ def test_the_code_of_a_page_works(page, program, tmp_path):
 
 
 def test_the_figures_of_the_inputs_are_written_to_their_folder():
-    """Without -o the script in the comment of an input would write to the top folder."""
+    """Without -o, the script in the comment of an input would write to the top folder."""
     comments = [path.read_text() for path in sorted((ROOT / "input").glob("*.nml"))]
     drawn = [line for text in comments for line in re.findall(r"^! +.*python post/.*", text, re.M)]
     assert drawn and [line for line in drawn if " -o runs/" not in line] == []
 
 
 def test_each_block_names_its_language():
-    """A block without a language, or with an unknown one, would not be executed."""
+    """A block in no known language would not be executed."""
     languages = {
         (path.name, one["language"]) for path in PAGES for one in BLOCK.finditer(path.read_text())
     }
@@ -181,7 +181,7 @@ def test_the_guides_make_their_own_figures():
     assert {path.stem for path in ROOT.glob("docs/guides/*.png")} == {*shown}
 
 
-#: Advice that a page must contain if the code of the page contains one of these words.
+#: Advice that a page must contain if its code contains one of these words.
 NEEDED = {
     r"import pandas|to_dataframe\(|\bsweep\(": "make demo",
     r"write_gsd|import gsd": "python -m pip install gsd",

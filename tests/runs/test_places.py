@@ -35,7 +35,7 @@ def everything_in(folder) -> dict[str, object]:
 def test_what_no_run_has_made_is_neither_written_through_nor_removed(
     ricochet, tmp_path, place, kind
 ):
-    """No run writes through a link or removes a foreign object, with or without --force."""
+    """This applies to links and foreign objects, with or without --force."""
     write_input(tmp_path, SHORT)
     precious = tmp_path / "home" / "precious"
     precious.parent.mkdir()
@@ -78,7 +78,7 @@ def test_what_a_killed_run_has_half_made_is_in_nobodys_way(ricochet, tmp_path):
 
 
 def test_a_run_that_was_killed_before_its_first_checkpoint_goes_on(ricochet, started, tmp_path):
-    """A run without a checkpoint starts again from its initial state."""
+    """Without a checkpoint it starts again from its initial state."""
     write_input(tmp_path, ENDLESS)
     process = started(*COMMAND)
     wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 10)
@@ -156,14 +156,14 @@ def test_outputs_that_differ_in_any_letter_share_nothing(ricochet, tmp_path):
 
 # --- at its end a run replaces only the file that existed at its start ---
 
-#: Options with which a run starts if the result of an earlier run exists.
+#: Options with which a run starts if there is a result of an earlier run.
 BEGINNINGS = {"in an empty place": [], "from a finished run": ["--resume"], "over one": ["--force"]}
 EARLY = ["--set", "stop.time=0.5"]
 
 
 @pytest.fixture(params=BEGINNINGS)
 def beginning(request, ricochet, tmp_path):
-    """Return the options of a run, with or without an earlier result at the path of the output."""
+    """Return the options of a run, with or without an earlier result at the output path."""
     write_input(tmp_path, SHORT)
     if BEGINNINGS[request.param]:
         assert ricochet(*COMMAND, *EARLY).returncode == FINISHED
@@ -184,7 +184,7 @@ def put(kind, place, other):
         content[len(content) // 2] ^= 1
         place.write_bytes(content)
         os.utime(place, ns=(date, date))
-    elif kind == "a link":  # to what was there, or to nothing
+    elif kind == "a link":  # to the former object, or to nothing
         if place.exists():
             place.rename(place.with_name("moved"))
         place.symlink_to("moved")
@@ -196,7 +196,7 @@ def put(kind, place, other):
 
 
 def what_stands(place):
-    """Return a description of the object at a path that can be compared."""
+    """Return a comparable description of the object at a path."""
     return place.readlink() if place.is_symlink() else place.is_file() and place.read_bytes()
 
 
@@ -211,9 +211,9 @@ def what_stands(place):
 def test_what_has_come_since_the_run_began_is_left(
     ricochet, started, tmp_path, beginning, kind, moment
 ):
-    """If an object appears at the path of the output during the run, it is not replaced.
+    """An object that appears at the output path during the run is not replaced.
 
-    The results stay in the .part file.
+    The results remain in the .part file.
     """
     other, place = tmp_path / "other.h5", tmp_path / "gas.h5"
     assert ricochet("gas.nml", "-o", other, *EARLY, "--set", "run.seed=2").returncode == FINISHED
@@ -241,7 +241,7 @@ def test_what_has_come_since_the_run_began_is_left(
 
 
 def test_a_copy_of_the_earlier_result_is_another_file(ricochet, tmp_path, beginning):
-    """A run that was copied to another folder can continue there, but does not replace a result."""
+    """A run copied to another folder can continue there, but does not replace a result."""
     assert ricochet(*COMMAND, *beginning, *AT_ONCE).returncode == STOPPED
     folder = tmp_path / "elsewhere"
     folder.mkdir()
@@ -274,7 +274,7 @@ def test_force_means_what_is_there_when_it_is_said(ricochet, tmp_path):
 
 
 def test_a_lock_that_was_removed_and_taken_anew_stays(started, tmp_path):
-    """When the first run ends, it must not remove the lock of the second run."""
+    """When the first run ends, it must not remove the lock of the second one."""
     write_input(tmp_path, ENDLESS)
     process = started(*COMMAND)
     wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 10)

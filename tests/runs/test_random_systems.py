@@ -1,13 +1,13 @@
-"""Random systems, run with many methods: results are bit-identical and satisfy general laws.
+"""Random systems, run with many methods: results are bit-identical and obey general laws.
 
 Each system is simulated in several ways: with default settings; on several threads; with another
 search and event queue; in parts that are ended by a time limit, by TERM or by kill -9 and then
 resumed; to an earlier end, from which the run is continued; with other samples; in memory; and in
-other units.  All runs of a system must end with the same exit code, the same message and the same
-bytes.  The results of the run with default settings must obey the laws in `run_laws`.
+other units. All runs of a system must end with the same exit code, the same message and the same
+bytes. The results with default settings must obey the laws in `run_laws`.
 
 The environment variables SYSTEMS and SEED set the number of systems and the seed, for example
-`SYSTEMS=200 SEED=20270131`.  `make check` uses another seed every day.
+`SYSTEMS=200 SEED=20270131`. `make check` uses a new seed every day.
 """
 
 import contextlib
@@ -39,7 +39,7 @@ KEPT = 20  #: number of systems in `make test`
 SECONDS = 200  # of processor time, which only endless runs exceed
 PARTS = 5
 BYTES = os.environ.get("BYTES", "4000000000")  # of address space
-LATEST = 1e100  # that an input can name
+LATEST = 1e100  # largest time that an input can name
 KILLED = (STOPPED, -signal.SIGTERM, -signal.SIGKILL)
 NOT_THE_END = ("placing disks:", "warning:", "note:", "stopped; the run is finished")
 #: Message for systems whose disks do not fit into the box.
@@ -56,14 +56,14 @@ AT_LAST_SAMPLE = re.compile(r"/observables/(virial_pressure|sides/\w+/(position|
 
 
 class End(NamedTuple):
-    """Exit code and last message of a run; `endless` means that it used too much processor time."""
+    """Exit code and last message of a run; `endless` if it used too much processor time."""
 
     code: int
     message: str
 
 
 class Case:
-    """A random system, and the folder with its input file."""
+    """Random system, and the folder with its input file."""
 
     def __init__(self, program: Path, folder: Path, seed: str):
         """Draw random systems until the program accepts one, and write its input file."""
@@ -84,7 +84,7 @@ class Case:
         return path if path.exists() else Path(f"{path}.part")
 
     def way(self) -> list[str]:
-        """Return random options that must not change the results."""
+        """Return random options that must not affect the results."""
         searches = ["pairs"] if self.system.disks <= 300 else []
         searches += ["rescan"] if self.system.disks <= 40 else []
         search = f"--set=run.search={self.rng.choice(['cells', 'cells', *searches])}"
@@ -101,7 +101,7 @@ class Case:
         return self.whole(name, *self.way())
 
     def in_parts(self, name: str, seconds: float) -> End:
-        """Perform a run in parts: the first part ends at once, and signals end further parts."""
+        """Execute a run in parts, the first of which ends at once and the others by signals."""
         end, options = End(STOPPED, ""), ["--set=output.checkpoint_every=1e-3"]
         for part in range(PARTS):
             first = ["--set=stop.wall_clock=1e-9"] if part == 0 else ["--resume"]
@@ -117,7 +117,7 @@ class Case:
         return End(FINISHED, "") if end.code == -signal.SIGKILL else end
 
     def continued(self, name: str, _seconds: float) -> End:
-        """Perform a run with an early end, and continue it to the final end."""
+        """Execute a run with an early end, and continue it to the final end."""
         with h5py.File(self.result("plain")) as file:
             last = float(file["particles/disks/position/time"][-1])
             collisions = int(file["observables/collisions/value"][-1])
@@ -183,7 +183,7 @@ class Case:
         return any(np.any((value != 0) & (np.abs(value) < least)) for value in moving)
 
     def in_other_units(self, name: str, _seconds: float) -> End:
-        """Perform the run with lengths, velocities and masses multiplied by powers of two."""
+        """Execute the run with lengths, velocities and masses multiplied by powers of two."""
         length, speed, mass = (2.0 ** self.rng.randint(-30, 30) for _ in range(3))
         self.units = {"length": length, "velocity": speed, "mass": mass, "s": 1, "degrees": 1}
         self.units |= {"time": length / speed, "energy": mass * speed**2}
@@ -197,7 +197,7 @@ class Case:
         return self.whole(name, *self.way(), text="other.nml")
 
 
-#: Units of the quantities in frames, observables and starting files.
+#: Units of the quantities in frames, observables and initial-configuration files.
 UNITS = {
     "/particles/disks/position/value": "length",
     "/particles/disks/position/time": "time",
@@ -261,7 +261,7 @@ def accepted(program: Path, folder: Path, rng: random.Random, **options: int | b
 
 
 def is_accepted(program: Path, folder: Path, system: System) -> bool:
-    """Write the files of a system, and return whether the program accepts the system.
+    """Write the files of a system, and return whether the program accepts it.
 
     The program may refuse the system only if its disks do not fit into the box.
     """
@@ -277,8 +277,8 @@ def is_accepted(program: Path, folder: Path, system: System) -> bool:
 def last_samples(found: dict) -> dict:
     """Return the values of the last samples without their sample numbers.
 
-    A run without any further event ends at its last sample.  The time of this sample affects only
-    the positions of moving sides, and the mean pressure since the start.
+    A run without any further event ends at its last sample, whose time affects only the positions
+    of moving sides and the mean pressure since the start.
     """
     return {
         name: value[-1:]
@@ -328,7 +328,7 @@ def faults(program: Path, folder: Path, seed: str) -> str:
 
 
 def first_kept(seeds: list[str], kept: int) -> list:
-    """Return parameters of a test; those beyond the first are tested in `.ci/run`.
+    """Return parameters of a test, of which those beyond the first are tested in `.ci/run`.
 
     All are tested if the variable SYSTEMS sets their number.
     """
@@ -344,7 +344,7 @@ def test_all_ways_end_alike_and_the_laws_hold(program, tmp_path, seed):
 
 # --- tests of the random systems themselves ---
 
-#: Variables that concern the execution of a run, or that require another run.
+#: Variables that concern the execution of a run, or require another run.
 NOT_DRAWN = {"run.title", "run.search", "run.queue", "run.threads", "stop.wall_clock"}
 NOT_DRAWN |= {"species.scale_positions", "obstacle.file"}
 NOT_DRAWN |= {"wall.file"}
@@ -378,10 +378,7 @@ APART = [
 
 
 def test_the_systems_draw_every_variable(program, tmp_path):
-    """The random systems use every input variable.
-
-    If a variable is missing by chance, use another SEED.
-    """
+    """If a variable is missing by chance, use another SEED."""
     table = table_of(program)
     known = {f"{group}.{name}" for group in table for name in table[group]}
     rngs = (random.Random(seed) for seed in SEEDS)

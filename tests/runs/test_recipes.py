@@ -1,4 +1,4 @@
-"""The recipes of docs/: they fit the sources, and what they add works."""
+"""The recipes of docs/: they fit the sources, and their additions work."""
 
 import re
 import shutil
@@ -29,7 +29,7 @@ def test_the_analysis_of_a_recipe_works(tmp_path):
 
 
 def replace_lines(name: str, text: str, old: list[str], new: list[str]) -> str:
-    """Replace complete lines of a file, which are found without regard to their indentation."""
+    """Replace complete lines of a file, found irrespective of their indentation."""
     pattern = "".join(rf"^( *){re.escape(line.strip())}\n" for line in old)
     places = [*re.finditer(pattern, text, re.MULTILINE)]
     how = f"{name} contains these lines of a recipe {len(places)} times instead of once"
@@ -48,7 +48,7 @@ def add_files(page: str, root: Path) -> None:
 
 
 def carry_out_recipes(page: str, root: Path) -> int:
-    """Apply the changes of the source code that a page describes: new files and new lines."""
+    """Apply the changes of the source code described on a page: new files and new lines."""
     add_files(page, root)
     changes = 0
     for block in re.findall(r"^```diff\n(.*?)^```", page, re.M | re.S):
@@ -93,7 +93,7 @@ def look_at_pulses(program, folder):
     """Check the results of the recipes for a placement and for a motion of a side.
 
     The disk on the right of the ring reaches the bottom at times 0.4, 1.2, ...; only at the first
-    of them, the side strikes with a velocity of 0.5.
+    of them does the side strike, with a velocity of 0.5.
     """
     (folder / "pulsed.nml").write_text(
         """&species count = 4 radius = 0.1 placement = 'ring' ring_radius = 0.3 velocity = 0, -1 /
@@ -111,7 +111,7 @@ def look_at_pulses(program, folder):
 
 @pytest.fixture
 def by_recipe(tmp_path):
-    """Return a copy of the sources in which all recipes have been carried out."""
+    """Return a copy of the sources in which all recipes have been applied."""
     for name in ("src", "post", "Makefile", "tests"):
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
@@ -129,11 +129,11 @@ def test_the_recipes_fit_the_sources_and_the_style(by_recipe):
 
 @pytest.mark.statistics
 def test_the_recipes_work(tmp_path, by_recipe):
-    """The program is compiled anew with all recipes, which takes half a minute."""
+    """The program is compiled with all recipes, which takes half a minute."""
     build = ["make", "-j2", "OPT=-O0", f"BUILD={tmp_path}/build"]
     about = "observables", "variables", "namelist_input"
     laws = " ".join(f"tests/unit/test_{name}.pf" for name in about)
-    for goal in ([], [f"tests={laws}", "unit-tests"]):  # they hold for what is new, too
+    for goal in ([], [f"tests={laws}", "unit-tests"]):  # these include the additions
         made = ran(*build, *goal, cwd=tmp_path, env=environment())
         assert made.returncode == 0, made.stdout + made.stderr
     (tmp_path / "all.nml").write_text(

@@ -1,10 +1,10 @@
-"""Changes at times that the input states (`&change`): the same bits as changes of a simulation.
+"""Scheduled changes in the input (`&change`): bit-identical to changes of a simulation.
 
-Each test draws a random system and changes it at random times with `Simulation.change`. Then an
-input contains the same changes. The program performs it in one, two and three threads, and with
-stops at random numbers of events; a simulation in memory plans the changes with
-`Simulation.schedule`, in a random order, and is copied, pickled, saved and loaded between them. All
-final states must be bit-identical.
+Each test draws a random system and changes it at random times with `Simulation.change`. An input
+then schedules the same changes. The program runs it on one, two and three threads, with stops at
+random numbers of events. A simulation in memory schedules the changes with `Simulation.schedule`,
+in random order, and is copied, pickled, saved and loaded between them. All final states must be
+bit-identical.
 
 The environment variables SYSTEMS and SEED set the number of systems and the seed.
 """
@@ -36,10 +36,10 @@ MOST_EVENTS = 600  #: between two changes
 
 
 class Course:
-    """A random system with changes at random times."""
+    """Random system with changes at random times."""
 
     def __init__(self, program: Path, seed: str):
-        """Draw the system, and perform it with changes of a simulation in memory."""
+        """Draw the system, and simulate it in memory with the changes."""
         self.program, self.rng = program, random.Random(seed)
         system = accepted(program, Path(), self.rng, most=MOST_DISKS, openings=False)
         self.draw: Draw = system.draw
@@ -63,7 +63,7 @@ class Course:
             self.facts, self.events = facts(simulation), simulation.events
 
     def advance(self, simulation: Simulation) -> None:
-        """Advance to a random time that is no time of a kick."""
+        """Advance to a random time without a kick."""
         rng, draw = self.rng, self.draw
         speed = simulation.observable("all/mean_speed") or draw.speed
         time = rng.choice([0.01, 0.3, 10]) * rng.random() * min(draw.edges) / speed
@@ -83,7 +83,7 @@ class Course:
         """Make a random change of variables, unless it is refused."""
         settings = drawn_change(simulation, self.draw).settings
         if self.steps and ("&drive" in self.text or (settings and settings[0].startswith("drive"))):
-            return  # the kicks of a step come after its changes
+            return  # the kicks of a step follow its changes
         if not settings or (self.changes and self.changes[-1][0] == self.end) or self.end == 0:
             return
         self.facts, self.events = facts(simulation), simulation.events
@@ -94,7 +94,7 @@ class Course:
         self.changes.append((self.end, settings))
 
     def run_file(self, name: str, *sets: str, stops: int = 0) -> None:
-        """Perform the input with the changes by the program, and compare its last state."""
+        """Run the input with the changes in the program, and compare its last state."""
         groups = []
         for time, settings in self.changes:
             words = ", ".join(f"'{one}'" for one in (line.replace("'", "''") for line in settings))
@@ -108,11 +108,12 @@ class Course:
             more = [f"--set=stop.events={cut}"] if cut is not None else []
             done = ran(self.program, *command, *more, *["--resume"] * (k > 0))
             if done.returncode == 3 and "is a finished run" in done.stderr:
-                continue  # two cuts at one number of events
+                continue  # two cuts at the same number of events
             if done.returncode != FINISHED:
                 break
         if self.message:
-            # The advice after it depends on the number of events until the collapse was noticed.
+            # The advice that follows depends on the number of events until the collapse was
+            # detected.
             assert self.message.split(":")[-1].split(";")[0] in done.stderr
             return
         assert done.returncode in (FINISHED, 3), done.stderr
@@ -124,7 +125,7 @@ class Course:
 
     def compare(self, there: dict) -> None:
         """Compare values with those of the first simulation."""
-        # If a change adds virial_tensor to a simulation in memory, this sum begins with the change.
+        # If a change adds virial_tensor to a simulation in memory, this sum starts at the change.
         different = [
             name
             for name in (self.facts.keys() & there.keys()) - {"virial_tensor"}
@@ -133,7 +134,7 @@ class Course:
         assert different == []
 
     def run_in_memory(self) -> None:
-        """Plan the changes of a simulation, and advance it in slices and copies."""
+        """Schedule the changes of a simulation, and advance it in slices and copies."""
         rng = self.rng
         simulation = Simulation("case.nml", {}, rng.choice([1, 1, 2]))
         pending = rng.sample(self.changes, len(self.changes))
@@ -186,7 +187,7 @@ GAS = """&run seed = 3 /
 
 
 def test_a_run_with_changes_resumes_from_any_time_with_other_later_changes(program, tmp_path):
-    """Changes after the checkpoint may differ, and changes before it may not."""
+    """Only changes after the checkpoint may differ."""
     (tmp_path / "gas.nml").write_text(GAS)
 
     def run(name, *words, more=""):
@@ -239,7 +240,7 @@ def test_the_balance_and_the_positions_of_sides_hold_across_changes(program, tmp
 
 
 def test_a_change_that_fails_at_its_time_ends_the_run_and_names_its_line(program, tmp_path):
-    """An oscillation begins at a position at which the side is not."""
+    """An oscillation would start at a position at which the side is not."""
     text = GAS + (
         "&change name = 'swing' time = 2 set = 'side.right.motion=sine',\n"
         " 'side.right.amplitude=0.05', 'side.right.period=1', 'side.right.phase=0' /\n"
@@ -288,10 +289,10 @@ def kicked_input(kind: str, change: str) -> str:
     "setting", ["drive.interval = 0.125", "drive.interval = 0.1", "contact.restitution = 0.9"]
 )
 def test_a_change_at_the_time_of_a_kick_precedes_the_kick(program, tmp_path, kind, setting):
-    """The kick at the time 0.5 is applied after the change, once, with any stops and threads.
+    """The kick at time 0.5 is applied once, after the change, with any stops and threads.
 
-    Its effect is that of the kick after a change just before 0.5, and it is the first one with the
-    new interval.
+    It has the same effect as after a change just before 0.5, and is the first with the new
+    interval.
     """
     at = {"same": 0.5, "before": math.nextafter(0.5, 0)}
     for name, time in at.items():
@@ -313,7 +314,7 @@ def test_a_change_at_the_time_of_a_kick_precedes_the_kick(program, tmp_path, kin
 
 @pytest.fixture
 def simulated_input(program, tmp_path):
-    """Return a function that performs an input of the project and reads the run."""
+    """Return a function that runs an input of the project and reads the result."""
 
     def simulated(name, *sets):
         output = tmp_path / f"{name}.h5"
@@ -327,7 +328,7 @@ def simulated_input(program, tmp_path):
 def test_a_saved_input_continues_a_simulation_after_its_scheduled_changes(
     program, tmp_path, monkeypatch, changed
 ):
-    """The saved input contains the scheduled changes that have been made since the last change."""
+    """The saved input contains the scheduled changes made since the last change."""
     monkeypatch.chdir(tmp_path)
     gas = Simulation(
         "&species count = 20 radius = 0.01 temperature = 1 /\n&stop time = 1 /\n"
@@ -345,7 +346,7 @@ def test_a_saved_input_continues_a_simulation_after_its_scheduled_changes(
 
 
 def test_a_free_expansion_does_no_work(simulated_input):
-    """No disk reaches the side, so that the energy remains the same, except for rounding errors."""
+    """No disk reaches the side, so that the energy is constant up to rounding errors."""
     run = simulated_input("free_expansion", "--set=stop.time=1.5")
     energy, work = run.observable("total_energy").value, run.observable("work").value
     assert max(np.ptp(energy), np.ptp(work)) < 1e-12 * energy[0]
@@ -378,7 +379,7 @@ def test_each_window_of_a_ramp_has_the_temperature_of_its_restitution(simulated_
 
 @pytest.mark.statistics
 def test_the_efficiency_of_a_slow_engine_is_that_of_carnot():
-    """The efficiency at finite speed is lower, and its limit agrees with Carnot's.
+    """The efficiency is lower at finite speed, and its limit is that of Carnot.
 
     The engine is that of the tutorial. The test takes about 4 s.
     """

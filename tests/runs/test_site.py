@@ -62,7 +62,7 @@ def test_links_lead_to_pages_and_files_of_the_site(stage):
 
 
 def test_no_page_is_long():
-    """Pages have at most 400 lines, except those that scripts generate."""
+    """Pages have at most 400 lines, except generated ones."""
     longer = [*ROOT.glob("docs/reference/input/*.md"), ROOT / "docs/explanation/validation.md"]
     pages = [ROOT / "README.md", *(p for p in ROOT.glob("docs/**/*.md") if p not in longer)]
     assert {p.name: n for p in pages if (n := p.read_text().count("\n")) > 400} == {}
@@ -128,7 +128,7 @@ def test_the_search_page_has_the_text_of_each_page(site, tmp_path):
 
 
 def test_the_lines_of_all_pages_have_one_width():
-    """Wrapping changes neither the words of a page nor a page that is wrapped."""
+    """Wrapping changes neither the words of a page nor a page that is already wrapped."""
     for page in wrap_pages.pages():
         text = page.read_text()
         assert wrap_pages.wrapped(text) == text, "python tests/support/wrap_pages.py does it"

@@ -1,4 +1,4 @@
-"""Starting files with columns for the radius, mass and other quantities of each disk."""
+"""Initial-configuration files with the radius, mass and other quantities of each disk."""
 
 import h5py
 import numpy as np
@@ -20,7 +20,7 @@ INPUT = """&box boundary = 'periodic', 'wall' upper = 2, 1 /
 
 @pytest.fixture
 def bed(tmp_path):
-    """Write a starting file bed.txt of disks with different radii, and return its arrays."""
+    """Write an initial-configuration file of disks of different radii, and return its arrays."""
     rng = np.random.default_rng(5)
     site = np.stack(np.divmod(np.arange(COUNT), 8), axis=1)
     arrays = {
@@ -38,7 +38,7 @@ def bed(tmp_path):
 
 
 def by_species(arrays):
-    """Return the arrays sorted by species, which is the order of the disks in the output file."""
+    """Return the arrays sorted by species, the order of the disks in the output file."""
     order = np.argsort(arrays["species"] != "bed", kind="stable")
     return {name: values[order] for name, values in arrays.items()}
 
@@ -65,7 +65,7 @@ SPINNING = INPUT + "&contact tangential_restitution = 0.3 friction = 0.2 restitu
 def test_every_column_arrives_to_the_last_digit_and_that_of_a_last_frame(
     ricochet, tmp_path, bed, text
 ):
-    """All columns are read exactly, and the input file can override columns for a species."""
+    """All columns are read exactly, and the input can override columns for a species."""
     names, rows = (tmp_path / "bed.txt").read_text().split("\n", 1)
     rows = f"# a bed\n{names.upper()}\n\n" + rows.replace(" ", ",\t")
     (tmp_path / "bed.txt").write_text("\ufeff" + rows.replace("\n", "\r\n") + "# its end")
@@ -130,7 +130,7 @@ def test_disks_of_many_sizes_grow_to_their_own(ricochet, tmp_path, bed):
 def test_radii_that_are_drawn_fill_what_was_asked_and_go_on(
     ricochet, tmp_path, law, spread, placement, packing
 ):
-    """Random radii have the requested packing fraction, and masses proportional to their areas."""
+    """Random radii yield the requested packing fraction, and masses proportional to their areas."""
     grown = "file = 'start.txt' velocities = 'rest' placement = 'grown'"
     where = grown if placement == "grown" else f"temperature = 1 placement = '{placement}'"
     site = np.stack(np.divmod(np.arange(400), 20), axis=1)
@@ -166,7 +166,7 @@ def test_radii_that_are_drawn_fill_what_was_asked_and_go_on(
 
 
 def test_maxwell_velocities_belong_to_the_mass_of_each_disk(ricochet, tmp_path):
-    """Light and heavy disks have the same kT, which is exact if this is requested."""
+    """Light and heavy disks have the same kT, which is exact on request."""
     x, y = np.divmod(np.arange(10000), 100)
     mass = np.where(x < 50, 1, 100)
     write_start(tmp_path / "bed.txt", np.stack([x, y], axis=1) + 0.5, radius=0.3, mass=mass)
@@ -266,7 +266,7 @@ def test_arrays_that_are_no_disks_are_refused(tmp_path, arrays, says):
 def test_a_run_goes_on_only_with_what_its_file_gave_the_disks(
     ricochet, tmp_path, velocities, given
 ):
-    """A run is continued only if the starting file contains the same quantities as before."""
+    """The file must contain the same quantities as before."""
     write_input(
         tmp_path,
         f"""&species file = 'start.txt' count = 3 radius = 0.05 mass = 1 velocities = {velocities} /

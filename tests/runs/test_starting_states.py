@@ -208,7 +208,7 @@ def test_a_relaxed_start_that_is_too_dense_is_told(ricochet, tmp_path):
 
 
 def test_disks_of_many_sizes_are_not_crushed_before_their_area_is_reached(ricochet, tmp_path):
-    """The largest radius does not count for all disks."""
+    """The largest radius is not used for all disks."""
     text = "&species count = 200 packing_fraction = {} polydispersity = 0.4 /\n&stop time = 1 /\n"
     text += "&side name = 'left' motion = 'constant_velocity' velocity = 0.5 end_time = 1 /\n"
     for packing, answer in ((0.45, "valid"), (0.52, "would crush the disks, which need at least")):

@@ -17,7 +17,7 @@ HEAVY = """&box upper = 4, 2 /
 
 
 def masses(rng: random.Random) -> str:
-    """Return a system whose masses extend over up to 30 powers of ten."""
+    """Return a system with masses extending over up to 30 powers of ten."""
     mass = sorted(10 ** rng.uniform(-15, 15) for _ in range(rng.randint(1, 4)))
     words = []
     for k, m in enumerate(mass):
@@ -64,7 +64,7 @@ def sums_and_logs(found: dict) -> dict:
 
 
 def test_the_energy_balance_is_closed_for_different_masses(ricochet, tmp_path):
-    """The energies that thousands of collisions of light disks dissipate are added without bias."""
+    """The energies dissipated in thousands of collisions of light disks are summed without bias."""
     (tmp_path / "gas.nml").write_text(
         """&species name = 'light' count = 7 mass = 0.01 radius = 0.067 speed = 1 /
         &species name = 'heavy' count = 1 mass = 100 radius = 0.073 velocities = 'rest' /

@@ -56,7 +56,7 @@ def test_a_sweep_and_the_script_go_on_with_each_others_members(tmp_path):
 
 @pytest.mark.usefixtures("_tools")
 def test_finished_members_are_extended_with_the_same_bits(program, tmp_path):
-    """Finished member runs are extended if the sweep has a later end."""
+    """This happens if the sweep has a later end."""
     values = {"contact.restitution": [0.9, 1], "run.seed": [1, 2]}
     longer = GAS.replace("disk = 5", "disk = 9") + "&output frames_every_time = 0.1 /\n"
     whole = sweep(longer, values, tmp_path / "whole")
@@ -77,7 +77,7 @@ def test_finished_members_are_extended_with_the_same_bits(program, tmp_path):
 
 @pytest.mark.usefixtures("_tools")
 def test_the_script_extends_finished_members_with_the_same_bits(tmp_path):
-    """ensemble.sh extends finished member runs if the input or --set specifies a later end."""
+    """This happens if the input or --set specifies a later end."""
     (tmp_path / "gas.nml").write_text(GAS)
 
     def run(folder, *words):
@@ -111,7 +111,7 @@ def test_the_script_extends_finished_members_with_the_same_bits(tmp_path):
 @pytest.mark.parametrize("engine", ["pool", "parallel", "slurm"])
 @pytest.mark.parametrize("interrupted", [False, True])
 def test_every_engine_extends_finished_members(program, tmp_path, engine, interrupted):
-    """The bits are those of one long run, also after the extension has been interrupted."""
+    """The bits are those of one long run, even after an interrupted extension."""
     if engine == "parallel" and not shutil.which("parallel"):
         pytest.skip("GNU parallel is not installed")
     own = slurm_surroundings(tmp_path) if engine == "slurm" else {}
@@ -208,7 +208,7 @@ TEXTS = ["a b", "a_b", "a, b", "a,b", "x --set run.seed=7", "it's --set", "''", 
 
 @pytest.mark.usefixtures("_tools")
 def test_texts_reach_the_program_as_they_are(tmp_path):
-    """Texts are passed to the program unchanged, and each text defines a separate member run."""
+    """Texts are passed unchanged, and each text defines a separate member run."""
     first = sweep(GAS, {"run.title": TEXTS[1::2], "run.seed": 3}, tmp_path)
     for path in tmp_path.glob("*.h5"):
         path.unlink()  # the script is to run it

@@ -1,6 +1,6 @@
 """Runs on several cores: numbers of threads, and special cases of the end of a run.
 
-`test_random_systems.py` tests with random systems that threads do not change the results.
+`test_random_systems.py` tests with random systems that threads do not affect the results.
 """
 
 import os
@@ -30,7 +30,7 @@ def threads_of(path: Path) -> int:
 
 @pytest.mark.parametrize("log", ["", "&output event_log = .true. /\n"], ids=["plain", "log"])
 def test_a_collapse_ends_a_run_on_several_cores_as_on_one(ricochet, tmp_path, log):
-    """After an inelastic collapse, a run on several cores ends in the same state as on one core."""
+    """The final state is that of a run on one core."""
     lossy = "&contact restitution = 0.3 / &stop collisions_per_disk = 200 /\n"
     write_input(tmp_path, GAS.replace("10000", "5000") + lossy + log)
     one, two = (
@@ -89,7 +89,7 @@ def test_moments_of_a_run_that_goes_on_on_several_cores_count_from_its_start(ric
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_run_says_what_it_did_on_one_core_though_it_had_two(ricochet, gas, threads):
-    """The summary and the file report one core if the program used only one of two cores."""
+    """The summary and the file report one core if the program used only one of two."""
     few = "--set=stop.collisions=9000"
     done = ricochet("gas.nml", "-o", "two.h5", few, f"--set=run.threads={threads}")
     said = [line for line in done.stdout.splitlines() if line.startswith("events_on_one_core")]
@@ -100,7 +100,7 @@ def test_a_run_says_what_it_did_on_one_core_though_it_had_two(ricochet, gas, thr
 
 
 def test_too_little_memory_for_domains_is_said(program, gas):
-    """The program prints a message if the memory is sufficient for one core but not for several."""
+    """There is a message if the memory suffices for one core but not for several."""
     facts = Path("/proc/meminfo").read_text().splitlines()
     facts = [line for line in facts if not line.startswith("MemAvailable")]
     (gas / "meminfo").write_text("\n".join(["MemAvailable: 14000 kB", *facts]))

@@ -60,7 +60,7 @@ def test_a_container_may_be_hardly_larger_than_its_disk(kind, law):
 )
 @pytest.mark.parametrize("law", ["wall_rule='velocity'", "wall_tangential_restitution=0"])
 def test_a_step_may_end_exactly_on_an_obstacle(obstacle, reflected, law):
-    """The disk is reflected at a centre or an end, and moves on along an outline."""
+    """The disk is reflected at a centre or an end, and continues along an outline."""
     rough = "wall_rule='normal' tangential_restitution=0 " if "tangential" in law else ""
     sliding = "surface_velocity=1" if rough else ""
     text = f"{obstacle} {sliding} /\n&contact {rough}{law} /\n"
