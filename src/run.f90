@@ -141,7 +141,7 @@ contains
     associate (command => run%command, sim => run%sim)
       call describe_system(run%input%settings, sim)
       found = is_file(source_of(command%output))
-      if (.not. found) found = is_file(command%output)     ! renamed by another run meanwhile
+      if (.not. found) found = is_file(command%output)     ! another run may have just renamed the output
       if (found .and. .not. command%check) call run%output%claim(command%output, error)
       if (.not. allocated(error)) call read_checkpoint(command%output, run%input, sim, progress, finished, error)
       if (.not. (found .or. allocated(error))) &

@@ -156,7 +156,7 @@ contains
     end do
   end subroutine describe_populations
 
-  !> Writes how the program was built and on which computer the file was created.
+  !> Writes the provenance: how the program was built, and on which computer the file was created.
   subroutine describe_origin(file, input)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input

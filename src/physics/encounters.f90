@@ -164,7 +164,7 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
-    real(real64) :: g, dx(2), dv(2)      ! normal impact velocity, separation [length], relative velocity
+    real(real64) :: g, dx(2), dv(2)      ! separation dx [length]; velocities g, dv [length/time]
 
     call relative_motion(sim, i, j, t, dx, dv)
     g = abs(dot_product(dx, dv))/magnitude(dx)
