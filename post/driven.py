@@ -1,4 +1,4 @@
-"""Quantities of driven disks against time, with pictures of the disks.
+"""Quantities of driven disks as functions of time, with pictures of the disks.
 
     python post/driven.py runs/heated/*.h5 -o heated.png --csv heated.csv
     python post/driven.py runs/constant_pressure/*.h5 --show width -o width.png
