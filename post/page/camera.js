@@ -3,12 +3,12 @@
 // The canvas has the shape of the region that the box covers during the film, including the motion of its sides. At zoom 1 the
 // whole region is visible. At larger zoom the view of a periodic box can move across its sides.
 const camera = { zoom: 1, x: 0, y: 0, follow: -1 };
-const page = { dots: 1, width: 0, height: 0, unit: 1, margin: 3 }; // canvas size, in pixels
+const page = { dots: 1, width: 0, height: 0, unit: 1, margin: 3 };  // canvas size, in pixels
 const view = { unit: 1, x: 0, y: 0 };  // pixels per unit of length; position of the lower left corner of the canvas
 
 const across = x => (x - view.x) * view.unit, up = y => page.height - (y - view.y) * view.unit;
 const backAcross = px => view.x + px / view.unit, backUp = py => view.y + (page.height - py) / view.unit;
-const CENTRED = 0.6; // size of the picture around the centre of mass, relative to the box, in which it moves
+const CENTRED = 0.6;  // size of the picture around the centre of mass, relative to the box, in which it moves
 const mostZoom = () => Math.max(8, 0.3 * Math.min(...film.edges) / Math.min(...film.radii));
 
 function aim() {
@@ -21,7 +21,7 @@ function aim() {
   } else [camera.x, camera.y] = [[camera.x, page.width], [camera.y, page.height]].map(([centre, size], axis) => {
     const low = film.lower[axis], edge = film.edges[axis], half = size / 2 / view.unit, margin = page.margin / view.unit;
     if (film.periodic[axis]) return centre - edge * Math.floor((centre - low) / edge);
-    const reach = Math.max(0, edge / 2 + margin - half); // the camera does not leave a box with walls
+    const reach = Math.max(0, edge / 2 + margin - half);  // the camera does not leave a box with walls
     return Math.max(low + edge / 2 - reach, Math.min(low + edge / 2 + reach, centre));
   });
   view.x = camera.x - page.width / 2 / view.unit;

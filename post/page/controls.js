@@ -1,8 +1,8 @@
 // ---------- settings that the user can change ----------
 
 const state = { playing: false, colour: '', traced: [], arrows: false, sofar: null, total: false, momenta: true, centred: false };
-let pace; // time of the film per second of real time, at speed 1
-let usual = true; // whether the pace is determined by the length and the speeds of this film
+let pace;          // time of the film per second of real time, at speed 1
+let usual = true;  // whether the pace is determined by the length and the speeds of this film
 
 function begin() {
   lookAtAll();
@@ -36,13 +36,13 @@ function prepareFilm() {
 
 // ---------- drawing ----------
 
-let told = 0; // time at which texts and plots were last drawn
+let told = 0;  // time at which texts and plots were last drawn
 
 function show(time, anew = false) {
   move(time);
   deselectAbsent();
   drawStage();
-  if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return; // less often than the disks
+  if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return;  // less often than the disks
   told = performance.now();
   if (source.grows) drawEnergies();
   $('cursor').style.transform = `translateX(${Math.min(cursorAt(moment.time), $('energy').width / page.dots - 4)}px)`;
@@ -58,15 +58,15 @@ function show(time, anew = false) {
 }
 
 function layout() {
-  if (!film || !$('main').clientWidth) return; // there is no film yet, or it is hidden
-  tell(); // first, because the stage takes the space that plots and texts leave
-  $('pressures').hidden = $('population').hidden = false; // visible, so that they can be measured
+  if (!film || !$('main').clientWidth) return;  // there is no film yet, or it is hidden
+  tell();  // first, because the stage takes the space that plots and texts leave
+  $('pressures').hidden = $('population').hidden = false;  // visible, so that they can be measured
   layOutStage();
-  drawLegend(); // its texts depend on the size of the disks on the screen
+  drawLegend();  // its texts depend on the size of the disks on the screen
   tellLimits();
   layOutStage();
   for (const canvas of ['histogram', 'energy', 'pressure', 'inside', 'polygon'].map($)) {
-    const { clientWidth, clientHeight } = canvas; // read once, because reading it forces a layout
+    const { clientWidth, clientHeight } = canvas;  // read once, because reading it forces a layout
     Object.assign(canvas, { width: Math.round(clientWidth * page.dots), height: Math.round(clientHeight * page.dots) });
   }
   layTableOut();
@@ -94,7 +94,7 @@ function refresh() {
 
 const paceNow = () => live.on && live.newest ? live.pace : pace * 10 ** +$('pace').value;
 
-let ticking; // request of the next animation frame
+let ticking;  // request of the next animation frame
 function play(on) {
   if (state.playing === on) return;
   state.playing = on;
@@ -148,8 +148,8 @@ function fromAddress() {
 
 // ---------- mouse and touch input on the picture of the disks ----------
 
-const pointers = new Map(); // fingers or mouse buttons that are down
-let moved = 0; // distance that they have moved [pixels]
+const pointers = new Map();  // fingers or mouse buttons that are down
+let moved = 0;               // distance that they have moved [pixels]
 
 const onStage = ({ clientX, clientY }) => {
   const box = $('stage').getBoundingClientRect();
@@ -157,7 +157,7 @@ const onStage = ({ clientX, clientY }) => {
 };
 
 function look() {
-  $('stage').style.touchAction = camera.zoom > 1 ? 'none' : 'pan-y'; // without zoom, a finger scrolls the page
+  $('stage').style.touchAction = camera.zoom > 1 ? 'none' : 'pan-y';  // without zoom, a finger scrolls the page
   press({ follow: camera.follow >= 0 });
   show(moment.time, true);
 }
@@ -172,8 +172,8 @@ function zoomBy(factor, px, py) {
 // { side }, { disk } or { tip } of an arrow; the pointer; its first position; the distance from there to the side, disk or tip;
 // and the time of the last message to the worker [ms]
 let grabbed = null;
-const GRIP = 14; // largest distance from which the mouse can drag a side [CSS pixels]
-const CURSORS = ['ew-resize', 'ns-resize']; // over a vertical and a horizontal side
+const GRIP = 14;  // largest distance from which the mouse can drag a side [CSS pixels]
+const CURSORS = ['ew-resize', 'ns-resize'];  // over a vertical and a horizontal side
 const HOLDABLE = [undefined, 'still', 'constant_velocity', 'piston'], TOLD_AGAIN = 100;
 const isFinger = ({ pointerType }) => pointerType === 'touch', reachOf = (event, mouse) => isFinger(event) ? 22 : mouse;  // [CSS pixels]
 
@@ -329,7 +329,7 @@ function listen() {
   stage.addEventListener('pointerdown', event => {
     const here = onStage(event);
     if (!pointers.size) [moved, grabbed] = [0, grabAt(...here, event)];
-    else if (moved < SLIP * page.dots) grabbed = null; // two fingers zoom
+    else if (moved < SLIP * page.dots) grabbed = null;  // two fingers zoom
     pointers.set(event.pointerId, here);
     stage.setPointerCapture(event.pointerId);
   });

@@ -1,6 +1,6 @@
 // ---------- buttons of open systems: they let disks in, and open or close sides ----------
 
-const LET_IN = 50; // largest number of disks let in by one click
+const LET_IN = 50;  // largest number of disks let in by one click
 
 // Labels the buttons of the newest run: one for each source, and one for each side that can be open.
 function buildDoors({ sources, sides, surfaces }) {

@@ -3,7 +3,7 @@
 // In the laboratory, the page of a run of two to four disks between walls has a panel with momenta, energies and the last
 // collision. While the film is paused at its newest frame, the tips of the velocity arrows can be dragged, and masses and
 // velocities can be edited in the panel. At the start of a run this changes its input, later the moving disks.
-const NO_SPEED = 1e-9; // fraction of the typical speed below which a velocity is shown as 0
+const NO_SPEED = 1e-9;  // fraction of the typical speed below which a velocity is shown as 0
 // typical speed and mass of the arrows; disk-disk collisions so far
 const encounter = { input: '', speed: 1, mass: 1, collisions: [], rows: '' };
 const isEncounter = () => !!film?.masses;
@@ -145,7 +145,7 @@ function buildBodies() {
   }));
 }
 
-const ofFrame = value => +value.toPrecision(7); // frames have single precision
+const ofFrame = value => +value.toPrecision(7);  // frames have single precision
 
 function enter(i, k, field) {
   const value = Number(field.value.trim().replace(',', '.').replace('−', '-'));
@@ -159,7 +159,7 @@ function tellEncounter() {
   if (!isEncounter()) return;
   const [ux, uy] = frameVelocity(), all = totals(), p = encounter.mass * encounter.speed, e = p * encounter.speed, { speed } = encounter;
   const rows = film.masses.map((mass, i) => [mass, VX[i] - ux, VY[i] - uy, mass * (VX[i] - ux), mass * (VY[i] - uy), mass * ((VX[i] - ux) ** 2 + (VY[i] - uy) ** 2) / 2]);
-  const frame = all.mass * (ux * ux + uy * uy) / 2; // energy due to the motion of the frame of reference
+  const frame = all.mass * (ux * ux + uy * uy) / 2;  // energy due to the motion of the frame of reference
   rows.push([all.mass, all.vx - ux, all.vy - uy, all.px - all.mass * ux, all.py - all.mass * uy, all.energy - frame]);
   const scales = [1e-9, speed, speed, p, p, e], aims = canAim();
   rows.forEach((row, i) => row.forEach((value, k) => {
@@ -207,7 +207,7 @@ function drawPolygon() {
   const [[x0, x1], [y0, y1]] = [range(0), range(1)], long = steps.reduce((sum, [px, py]) => sum + Math.hypot(px, py), 0) || 1;
   const unit = Math.min((width - 30) / long, (height - 24) / Math.max(y1 - y0, 0.3 * long));
   const x = px => width / 2 + (px - (x0 + x1) / 2) * unit, y = py => height / 2 - (py - (y0 + y1) / 2) * unit;
-  const apart = (y1 - y0) * unit < 12 ? 9 : 0; // offset of arrows that would cover each other [CSS pixels]
+  const apart = (y1 - y0) * unit < 12 ? 9 : 0;  // offset of arrows that would cover each other [CSS pixels]
   const arrow = (k, from, to, colour, dash) => {
     const [ax, bx] = [x(from[0]), x(to[0])], [ay, by] = [from, to].map(one => y(one[1]) + (k - disks / 2) * apart);
     const [dx, dy] = [bx - ax, by - ay], size = Math.hypot(dx, dy), head = Math.min(7, size) / (size || 1);

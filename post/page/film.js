@@ -3,14 +3,14 @@
 // ---------- data of the film, which comes from a file or from a worker process ----------
 
 const $ = id => document.getElementById(id);
-let film, disks, kinds; // facts of the film; number of disks; species
-let speciesOf, sizeOf, masses; // by disk: index of its species, index of its size, mass
-let X, Y, VX, VY; // present positions and velocities; positions are wrapped into a periodic box
-let UX, UY, HITS; // positions continuous since the previous frame; events since that frame
-let angles; // present orientations, if the disks have any
-let source; // source of frames and events: a file or a worker
-let past = []; // frames: time, position and velocity (x1 y1 x2 y2 ...), angle, image counters relative to the first frame, ...
-let origins; // positions x1 y1 x2 y2 ... from which displacements are measured
+let film, disks, kinds;         // facts of the film; number of disks; species
+let speciesOf, sizeOf, masses;  // by disk: index of its species, index of its size, mass
+let X, Y, VX, VY;               // present positions and velocities; positions are wrapped into a periodic box
+let UX, UY, HITS;               // positions continuous since the previous frame; events since that frame
+let angles;                     // present orientations, if the disks have any
+let source;                     // source of frames and events: a file or a worker
+let past = [];                  // frames: time, position and velocity (x1 y1 x2 y2 ...), angle, image counters relative to the first frame, ...
+let origins;                    // positions x1 y1 x2 y2 ... from which displacements are measured
 // `inside`: disks of each species in the box
 const moment = { time: 0, shown: 0, frame: 0, inside: [], kinetic: [], potential: [], collisions: 0 };
 
@@ -50,7 +50,7 @@ function upTo(values, value, number = one => one) {
   return low;
 }
 
-const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1); // the last frame at or before this time
+const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1);  // the last frame at or before this time
 const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
 
 // Stores in a frame the image counters of each disk (box periods crossed since the first frame), in the order x1, y1, x2, y2 and
@@ -70,7 +70,7 @@ function cross(frame, moved) {
 // velocity changes. start: index of the first change after each frame; turns: disk, fraction of the
 // interval and new velocity of each change
 let ways;
-let events; // events of the log: time (when), partners (i, j), number of disk-disk collisions so far (pairs)
+let events;  // events of the log: time (when), partners (i, j), number of disk-disk collisions so far (pairs)
 
 function move(time) {
   moment.time = clamp(time, first(), last());

@@ -3,21 +3,21 @@
 // ---------- laboratory: an input form and several films, each of which has its own worker process ----------
 
 const $ = id => document.getElementById(id);
-const lab = JSON.parse($('data').textContent); // table of variables by group, and the inputs to choose from
+const lab = JSON.parse($('data').textContent);  // table of variables by group, and the inputs to choose from
 const state = {
-  input: null, groups: [], // the input (name, title, sliders, ...); the groups of its file, with kind, address and values
-  settings: {}, added: [], // variables that the form changes, with their texts; groups that are not in the file: [kind, name]
-  has: {}, // settings of the present run
-  waiting: {}, // variables whose text was refused, with text and message
-  runs: 0, // number of runs so far
-  boxes: [], // runs { figure, frame, letter, words, run, shown } kept for comparison, and the present one at the end
-  paused: false, started: false, note: '', // whether the films are paused; whether the input has a run; error in the address
+  input: null, groups: [],   // the input (name, title, sliders, ...); the groups of its file, with kind, address and values
+  settings: {}, added: [],   // variables that the form changes, with their texts; groups that are not in the file: [kind, name]
+  has: {},                   // settings of the present run
+  waiting: {},               // variables whose text was refused, with text and message
+  runs: 0,                   // number of runs so far
+  boxes: [],                 // runs { figure, frame, letter, words, run, shown } kept for comparison, and the present one at the end
+  paused: false, started: false, note: '',   // whether the films are paused; whether the input has a run; error in the address
 };
 // Variables that can be changed while a simulation is running. Changing any other variable starts a new run.
 const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|surface_velocity|velocity|mass|force|open)|source\.\w+\.(count|interval|velocity|temperature|\w+_time))/.test(key);
 const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', virial_pressure: 'pressure', dissipated_energy: 'energy lost per time', collisions: 'collisions per time' };
 const IMPOSSIBLE = 'One value is not possible: the form says why.';
-const MOST_KEPT = 3, FULL = 0.5; // largest number of kept runs; packing fraction that random placement reaches easily
+const MOST_KEPT = 3, FULL = 0.5;  // largest number of kept runs; packing fraction that random placement reaches easily
 
 function make(tag, more = {}, ...children) {
   const element = Object.assign(document.createElement(tag), more);
@@ -38,7 +38,7 @@ function set(key, text) {
   const old = textOf(key);
   delete state.waiting[key];
   state.note = '';
-  delete state.settings[key]; // makes the latest setting the last in the list
+  delete state.settings[key];  // makes the latest setting the last in the list
   if (text !== givenAs(key)) state.settings[key] = text;
   sync();
   if (text !== old) changed(key);
@@ -55,7 +55,7 @@ function inWords([key, value]) {
 }
 
 const settingsInWords = () => Object.entries(wish().settings).map(inWords).join(' · ') || 'as in the file';
-const changeInWords = ([, key, value]) => key ? inWords([key, value]) : value; // a change without a variable is already in words
+const changeInWords = ([, key, value]) => key ? inWords([key, value]) : value;  // a change without a variable is already in words
 
 // ---------- sliders ----------
 
@@ -196,7 +196,7 @@ async function choose(name, settings = {}) {
   const answer = await fetch('form?' + encodeURIComponent(name)).catch(() => null);
   if (!answer?.ok) { tell(answer ? await answer.text() : 'No answer: the laboratory has ended.', true); return; }
   const form = await answer.json();
-  if (state.input.name !== name) return; // another input has been chosen meanwhile
+  if (state.input.name !== name) return;  // another input has been chosen meanwhile
   state.groups = form.groups;
   if (!isPlain) begin(settings);
   $('about').replaceChildren(...form.about.split(/\n\n+/).map(text => make('p', { textContent: text })));
@@ -256,7 +256,7 @@ function newBox() {
 }
 
 // Two runs never start at the same time: values changed during the start of a run take effect in the next one.
-const PLACING = 2000; // time after which placing disks is abandoned in favour of newer settings [ms]
+const PLACING = 2000;  // time after which placing disks is abandoned in favour of newer settings [ms]
 let busy = 0, again = false, timer, latest = {};
 function run() {
   timer = clearTimeout(timer);
@@ -267,7 +267,7 @@ function run() {
   if (busy && isThere(box)) filmOf(box).leave();
   busy = now;
   tell('');
-  state.paused = !!state.input.paused; // the films of some inputs wait at the start
+  state.paused = !!state.input.paused;  // the films of some inputs wait at the start
   tellPause();
   const begin = () => {
     box.frame.onload = null;
@@ -276,7 +276,7 @@ function run() {
     box.wished = { ...wish(), words: settingsInWords(), run: ++state.runs };
     filmOf(box).start(box.wished);
   };
-  if (isThere(box)) begin(); else box.frame.onload = begin; // replaces an earlier request that waits for the frame
+  if (isThere(box)) begin(); else box.frame.onload = begin;  // replaces an earlier request that waits for the frame
 }
 
 // Applies a change while the slider moves, if a running simulation allows it, or else starts a new run.
@@ -448,12 +448,12 @@ setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
 // The newest film determines the time that all films show. The next time is requested from all worker processes, and shown once
 // the slowest has reached it. While a film replays stored frames, the requested times are those of its frames, except times at
 // which another film has no frame and would have to show an earlier one.
-const clock = { next: null, shown: 0 }; // time requested; when the films were last drawn [ms]
+const clock = { next: null, shown: 0 };  // time requested; when the films were last drawn [ms]
 function conducts(source) {
   if (!isComparing()) return false;
   if (source !== filmOf(current())) return true;
   const all = films(), now = performance.now();
-  if (all.some(one => one.isStarting())) return true; // such a film still shows the time of its previous run
+  if (all.some(one => one.isStarting())) return true;  // such a film still shows the time of its previous run
   if (clock.next === null) request(all, 1 / 60);
   if (clock.next === null || !all.every(one => one.hasReached(clock.next))) return true;
   for (const one of all) one.show(clock.next);
@@ -495,7 +495,7 @@ function paced(source) {
 
 // ---------- scan: measurement of one quantity for five values of an input variable ----------
 
-let scan, scanner; // measured quantity and values; the worker that measures
+let scan, scanner;  // measured quantity and values; the worker that measures
 function beginScan() {
   const spec = state.input.sliders[$('scanned').value], { key, log } = spec, values = valuesOf(spec, 4), texts = values.map(value => textWith(spec, String(value)));
   scan = { x: spec.words, y: MEASURED[$('measured').value], log, points: [], values, said: '' };
@@ -514,7 +514,7 @@ function drawScan() {
   $('curve').setAttribute('aria-label', $('points').textContent);
 }
 
-function addToScan({ is, index, mean, error, problems }) { // values that cannot be measured appear as a gap
+function addToScan({ is, index, mean, error, problems }) {  // values that cannot be measured appear as a gap
   if (problems) scan.said = (is === 'scan' ? `${short(scan.values[index])}: ` : '') + problems[0].text;
   else scan.points.push([scan.values[index], mean, error]);
   drawScan();
@@ -551,14 +551,14 @@ const actions = {
   another: () => { if ($('add').value) addGroup(...$('add').value.split(' ')); },
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
-const MOVES = new Set(['ArrowLeft', 'ArrowRight', 'Home', 'End', 'n', ' ']); // keys that act on the newest film, which the others follow
+const MOVES = new Set(['ArrowLeft', 'ArrowRight', 'Home', 'End', 'n', ' ']);  // keys that act on the newest film, which the others follow
 const keys = { r: 'run', p: 'pause', c: 'keep', s: 'settings', l: 'larger' };
 
 // Keyboard shortcuts of the laboratory work unless an input field or a menu has the focus. Shortcuts for films apply to the film
 // with the focus or, if there is none, to all films.
 function typed(event) {
   const { key, target } = event, own = target.ownerDocument === document;
-  if (key === 'Enter' && target.matches('input:not([type])')) target.blur(); // the text is complete, so the next keys are shortcuts
+  if (key === 'Enter' && target.matches('input:not([type])')) target.blur();  // the text is complete, so the next keys are shortcuts
   if (target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || $('inputs').open) return;
   if (keys[key]) actions[keys[key]]();
   else if (own && !(target.matches('input') && /^(Arrow|Home|End|Page)/.test(key)) && !(key === ' ' && target.matches('input, button, summary'))) {
@@ -578,7 +578,7 @@ document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark
 buildInputs();
 newBox();
 const narrow = matchMedia('(max-width: 1099px), (max-height: 500px)');
-narrow.addEventListener('change', () => bare(narrow.matches)); // the form then becomes a drawer, which is initially closed
+narrow.addEventListener('change', () => bare(narrow.matches));  // the form then becomes a drawer, which is initially closed
 bare(narrow.matches);
 addEventListener('hashchange', fromAddress);
 fromAddress();

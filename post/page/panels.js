@@ -22,8 +22,8 @@ function tell() {
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) ${isInside(i) ? `at <b>${short(X[i])}, ${short(Y[i])}</b>` : 'is outside'}`).join('<br>');
 }
 
-// Marks the times of the changes of the run behind the time line: browsers draw no background of a slider itself. The thumb of the
-// slider is 16 pixels wide, and a mark 2.
+// Marks the times at which the run was changed behind the time line, because browsers draw no background for a slider. The thumb
+// of the slider is 16 pixels wide, and a mark 2.
 function markChanges() {
   const shares = film.changes.map(([time]) => (time - first()) / (last() - first() || 1)).filter(share => share >= 0 && share <= 1);
   const marks = shares.map(share => `linear-gradient(var(--accent), var(--accent)) calc(7px + ${share} * (100% - 14px)) 50% / 2px 60% no-repeat`);
@@ -32,14 +32,14 @@ function markChanges() {
   $('scrub').title = film.changes.map(([time, words]) => `t = ${short(time)}: ${words}`).join('\n');
 }
 
-// Returns the words that stand below the controls while no disk is selected.
+// Returns the words below the controls while no disk is selected.
 function hint() {
   if (!isPart) return 'Select a disk to see its trace.';
   if (!state.playing) return `Drag a disk${canAim() ? ' or the end of its arrow' : ''}, or select it to see its trace.`;
   return `${film.sides.some((_, k) => canHold(k)) ? 'Drag a side of the box, or select' : 'Select'} a disk to see its trace.`;
 }
 
-// Writes descriptions of the picture and of each plot for screen readers.
+// Describes the picture and each plot for screen readers.
 const listed = words => words.filter(Boolean).join(', ');
 function describe() {
   const [width, height] = film.edges, each = kinds.map(({ name, sizes }, s) => `${moment.inside[s]} ${name} (${sizes})`);
@@ -59,7 +59,7 @@ function describe() {
 const describeLaw = (name, { temperature, speed, motion }) => (temperature || speed || motion) && `${name} ${listed([
   temperature && `heats: kT = ${short(temperature)}`, speed && `slides with ${short(speed)}`, motion && `moves (${motion})`])}`;
 
-// Returns a text label with a sample of the colour of a species.
+// Returns a label with the colour of a species.
 function chip(kind, text) {
   const element = Object.assign(document.createElement('span'), { className: 'chip', textContent: text });
   element.style.setProperty('--own', css(speciesColour(kind)));
@@ -68,7 +68,7 @@ function chip(kind, text) {
 
 const PATTERN_WORDS = ['', ', striped', ', striped upright', ', chequered'];
 
-// Returns the name of the fill pattern of a species if the disks at zoom 1 are large enough for a pattern.
+// Returns the name of the fill pattern of a species, if its disks are large enough for one at zoom 1.
 function patternOf(s) {
   const radius = Math.max(leastRadius(), page.unit * film.radii[sizeOf[speciesOf.indexOf(s)]]);
   return isStriped(s, radius) ? PATTERN_WORDS[s % PATTERN_WORDS.length] : '';
@@ -83,9 +83,10 @@ function drawLegend() {
     const middle = state.colour === 'collisions' ? Math.expm1(Math.log1p(scale[1]) / 2) : scale[1] / 2;
     legend.innerHTML = `<div id="scale"><i></i>
       <span><b>0</b><b>${short(+middle.toPrecision(2))}</b><b>≥ ${short(+scale[1].toPrecision(2))}</b></span></div>`;
-    legend.querySelector('i').style.background = `linear-gradient(to right, ${stops})`;  // the security policy of the page refuses inline styles
+    // the security policy of the page refuses inline styles
+    legend.querySelector('i').style.background = `linear-gradient(to right, ${stops})`;
   }
-  // The motion is that at the start: a note about a side that is dragged would change the size of the picture meanwhile.
+  // The initial motion is described, because a note about a dragged side would change the size of the picture.
   const sides = film.sides.map((law, k) => ({ ...law, motion: film.atStart[k].motion }));
   const notes = [scale?.[0], film.sides.some(({ open }) => open !== undefined) && 'dotted: open side', ...sides.map((law, k) => describeLaw(film.surfaces[k], law))].filter(Boolean);
   if (notes.length) legend.append(Object.assign(document.createElement('p'), { textContent: notes.join('; ') }));
@@ -108,8 +109,8 @@ function prepare(canvas) {
   return { pen, size, left: 42 * size, right: width - 4, top: 6, bottom: height - 26 * size };
 }
 
-// Draws two axes for the values from (x0, y0) to (x1, y1), with about three tick labels on each axis. The function returns two
-// functions, which convert values to pixels.
+// Draws two axes for values from (x0, y0) to (x1, y1) with about three tick labels each. Returns two functions that convert
+// values to pixels.
 function axes(plot, [x0, x1], [y0, y1], words, name = short, nameOfY = name) {
   const { pen, size, left, right, top, bottom } = plot;
   const x = value => left + (value - x0) / (x1 - x0) * (right - left);
@@ -130,7 +131,7 @@ function axes(plot, [x0, x1], [y0, y1], words, name = short, nameOfY = name) {
   return { x, y };
 }
 
-// Returns round numbers between two values; their spacing is 1, 2 or 5 times a power of ten.
+// Returns round numbers between two values, spaced by 1, 2 or 5 times a power of ten.
 function round(low, high) {
   const least = (high - low) / 4, power = 10 ** Math.floor(Math.log10(least) + 1e-9), values = [];
   const step = power * [1, 2, 5, 10].find(k => k * power >= least * (1 - 1e-9));
@@ -138,8 +139,8 @@ function round(low, high) {
   return values;
 }
 
-// Plots the curves { time, values, colour, dash, letter } against time. The vertical axis includes 0. The part of each curve after
-// the time `now` is pale, and null values leave gaps. The function returns another function, which converts times to pixels.
+// Plots curves { time, values, colour, dash, letter } against time on an axis that includes 0. Curves are pale after the time
+// `now`; null values leave gaps. Returns a function that converts times to pixels.
 function plotLines(canvas, lines, now) {
   const range = lines.map(({ time }) => [time[0], time.at(-1)]), start = Math.min(...range.map(([t]) => t));
   const end = Math.max(...range.map(([, t]) => t)), plot = prepare(canvas), { pen } = plot;
@@ -169,23 +170,22 @@ function plotLines(canvas, lines, now) {
 
 // ---------- histogram of speeds ----------
 
-const FEWEST = 10;  // least number of disks of a species for a histogram
-let counted;        // species that have a histogram
-// Tells whether Maxwell's law applies: disks that never collide and that no heat bath touches keep their speeds.
+const FEWEST = 10;  // fewest disks of a species for a histogram
+let counted;        // species with a histogram
+// True if Maxwell's law applies. Disks that never collide and touch no heat bath keep their speeds.
 const settled = () => film.settles && (film.heated || past.at(-1).collisions > 0);
 
-let sums;           // the histograms of all frames so far, and the number of the last of these frames
+let sums;           // histograms of all frames so far, and the index of the last of these frames
 
-// Defines the histogram bins from zero to a given maximum speed. If many disks are at rest, the axis is logarithmic: on a linear
-// axis the bar of the resting disks would be much higher than all other bars.
+// Sets histogram bins from zero to a maximum speed. If many disks are at rest, the axis is logarithmic, because on a linear axis
+// the bar of the resting disks would dwarf all others.
 const RESTING = 0.02;  // fraction of disks at rest above which the axis is logarithmic
 function setBins(most, resting) {
   const rest = resting > RESTING && resting < 1;
   film.speeds = { rest, edges: Array.from({ length: 41 }, (_, k) => rest ? most * 10 ** (k / 10 - 4) : most * k / 40) };
 }
 
-// Returns the fraction of the disks of each species in each bin of the histogram. The fractions of disks are calculated for the
-// time shown, or as means over all frames received so far.
+// Returns the fraction of the disks of each species in each bin, at the time shown or averaged over all frames received so far.
 function speedsNow() {
   const { edges, rest } = film.speeds, bins = edges.length - 1, width = edges[1] - edges[0];
   const seen = kinds.map(() => 0), bin = speed => rest ? speed > 0 ? Math.max(1, upTo(edges, speed)) : 0 : Math.floor(speed / width);
@@ -236,7 +236,7 @@ function drawHistogram() {
   pen.restore();
 }
 
-// Returns m/E of a species with the mean kinetic energy E. Its Maxwell distribution has the maximum √(m/E) e^(−1/2).
+// Returns m/E of a species with mean kinetic energy E. Its Maxwell distribution has the maximum √(m/E) e^(−1/2).
 const narrowness = ({ kinds: own, energies }, s) => own[s].mass / (energies[s] || Infinity);
 
 function drawMaxwell(pen, one, s, x, y, top) {
@@ -257,14 +257,14 @@ function tellBars() {
   if ($('bars').textContent !== words) $('bars').textContent = words;
 }
 
-// Returns the histogram of the speeds of the disks in this film, and the energies of its Maxwell curves. Other films on the page draw
-// both for comparison.
+// Returns the histogram of the speeds in this film, and the energies of its Maxwell curves, both of which other films on the page
+// draw for comparison.
 function speedsOfFilm() {
   const isSettled = settled(), energies = kinds.map((_, s) => (isSettled ? film.curves?.mean?.[s] : null) ?? moment.kinetic[s]);
   return { kinds, counted, settled: isSettled, energies, ...film.speeds, ...speedsNow() };
 }
 
-// Draws the histogram of speeds of a compared run as a line above the bars, and labels the line with the letter of the run.
+// Draws the histogram of speeds of a compared run as a line above the bars, labelled with the letter of the run.
 function drawOutline(pen, one, x, height, from) {
   one.kinds.forEach((kind, s) => {
     let best = [0, Infinity];
@@ -301,8 +301,8 @@ function drawSpeedsAndRest(plot, counts, seen, others) {
 // ---------- plots of energies and pressure against time ----------
 
 const ENERGIES = { kinetic: [], potential: [5, 3], rotational: [1.5, 2.5] }, DASHES = [[], [7, 2], [2, 2], [7, 2, 2, 2]];
-let cursorAt;      // the map from times to pixels
-let overlaid = [];  // compared runs in the same plots: letter, curves, kinds, and functions for speeds and numbers at the moment shown
+let cursorAt;      // conversion of times to pixels
+let overlaid = [];  // compared runs in the same plots: letter, curves, kinds, and functions for present speeds and numbers
 
 const share = s => state.total ? moment.inside[s] : 1;
 const there = () => Object.keys(ENERGIES).filter(kind => source.curves()[kind]);
@@ -325,7 +325,7 @@ function drawEnergies() {
 
 function drawPressure() {
   const { time, pressure: measured } = source.curves(), colour = ink.accent;
-  const falls = film.gravity.some(Boolean), pressure = falls ? null : measured;  // under gravity it depends on the height
+  const falls = film.gravity.some(Boolean), pressure = falls ? null : measured;  // depends on the height under gravity
   const lines = overlaid.filter(({ curves }) => curves.pressure && !falls).map(({ letter, curves }) => ({ time: curves.time, values: curves.pressure, colour, letter }));
   if (pressure?.some(one => one !== null)) lines.push({ time, values: pressure, colour });
   $('pressures').hidden = !lines.length;
@@ -334,7 +334,7 @@ function drawPressure() {
   $('force').textContent = now === null || now === undefined ? '' : short(now);
 }
 
-// Plots the numbers of disks inside an open system, and of those that left and entered so far.
+// Plots the numbers of disks inside an open system, and of those that have left and entered.
 function drawInside() {
   $('population').hidden = !film.isOpen;
   if (!film.isOpen) return;
@@ -384,7 +384,7 @@ function lawOf({ theory, error }) {
   return rounded(theory, Math.min(secondDigit(error), Math.floor(Math.log10(Math.abs(theory))) - 3));
 }
 
-// Returns the temperature and the mean speed of each species of the disks shown.
+// Returns the temperature and the mean speed of each species at the time shown.
 function speedsAndTemperature() {
   let mass = 0, px = 0, py = 0, energy = 0;
   const speeds = kinds.map(() => 0);
@@ -409,9 +409,8 @@ function numbersNow() {
   return means.map((one, k) => ({ ...one, now: now[k] ?? null }));
 }
 
-// For a single run, the table shows the present value, the mean and the theoretical value of each
-// quantity. For several runs, the table shows for each run the means (or else the present values)
-// and the theoretical values.
+// For a single run, the table lists the present, mean and theoretical value of each quantity; for several runs, the mean (or else
+// the present value) and the theoretical value for each of them.
 function tellNumbers() {
   const own = numbersNow(), seen = value => value === null ? '' : short(value), some = (rows, what) => rows.some(one => one[what] !== null);
   $('measured').hidden = !own.length;

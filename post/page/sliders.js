@@ -1,12 +1,12 @@
 // ---------- sliders, for the mouse, the keyboard and fingers ----------
 
-const SLIP = 6; // a pointer that moves less is a click, not a drag [CSS pixels]
+const SLIP = 6;  // a pointer that moves less is a click, not a drag [CSS pixels]
 
 // Calls `act` whenever the user sets a slider. Browsers set a slider as soon as a finger touches it, even if the finger then
 // scrolls the page. A touch therefore acts only when the finger moves along the slider or is lifted; if the page is scrolled, the
 // slider returns to its earlier value.
 function onSlide(slider, act) {
-  let touch = null; // value and finger position at the start of a touch that has not acted yet
+  let touch = null;  // value and finger position at the start of a touch that has not acted yet
   const acts = () => { touch = null; act(); };
   slider.addEventListener('pointerdown', ({ pointerType, clientX }) => { touch = pointerType === 'touch' ? { value: slider.value, from: clientX, scrolls: false } : null; });
   slider.addEventListener('pointermove', ({ clientX }) => { if (touch && !touch.scrolls && Math.abs(clientX - touch.from) > SLIP) acts(); });

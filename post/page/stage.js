@@ -3,11 +3,11 @@
 
 const layers = ['ground', 'disks', 'marks'].map($);
 const [ground, disksBrush, marks] = layers.map((layer, k) => layer.getContext('2d', { willReadFrequently: k === 1 }));
-let ink; // colours of the theme
-let picture, pixels, palette, paper; // image of the disks; its pixels as integers; colours of disks and background in the same format
-let radii; // of each size [pixels]
-let warmest, sliding; // highest temperature of a boundary; whether a boundary slides
-let groundShown, marked; // view for which the ground was drawn; whether the layer of marks contains marks
+let ink;                       // colours of the theme
+let picture, pixels, palette, paper;  // image of the disks; its pixels as integers; colours of disks and background in the same format
+let radii;                     // of each size [pixels]
+let warmest, sliding;          // highest temperature of a boundary; whether a boundary slides
+let groundShown, marked;       // view for which the ground was drawn; whether the layer of marks contains marks
 
 const dark = () => document.documentElement.dataset.theme === 'dark';
 const cssColour = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
@@ -41,7 +41,7 @@ function scaleColour(place) {
 const quantities = {
   speed: i => Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]) / film.scales.speed[1],
   displacement: i => displacement(i) / film.scales.displacement[1],
-  collisions(i) { // on a logarithmic scale
+  collisions(i) {  // on a logarithmic scale
     const scale = Math.log1p(film.scales.collisions[1]), before = past[moment.frame].hits[i] / 255;
     return HITS[i] ? Math.log1p(Math.expm1(before * scale) + HITS[i]) / scale : before;
   },
@@ -206,7 +206,7 @@ function inBox(brush, action) {
 // vertical stripes. Between the stripes the background is visible.
 const SMALLEST_PATTERN = 3.5, PATTERNS = [0, 1, 2, 3];
 const isStriped = (kind, radius) => PATTERNS[kind % PATTERNS.length] > 0 && radius >= SMALLEST_PATTERN * page.dots;
-const bare = share => share - Math.floor(share) > 0.66; // the last third of each period of the stripes is transparent
+const bare = share => share - Math.floor(share) > 0.66;  // the last third of each period of the stripes is transparent
 
 function drawDisks() {
   const code = codesNow(state.colour), [width, height] = film.edges, wraps = film.periodic.some(Boolean);
@@ -226,7 +226,7 @@ function drawDisks() {
 
 function drawDisk(x, y, radius, colour, stripes, [left, top, right, bottom]) {
   const cx = x - 0.5, cy = y - 0.5, reach = radius + 0.5, inner = (radius - 0.5) ** 2;
-  const often = 1 / Math.max(3.5 * page.dots, 0.55 * radius); // stripes per pixel; a stripe runs through the centre
+  const often = 1 / Math.max(3.5 * page.dots, 0.55 * radius);  // stripes per pixel; a stripe runs through the centre
   const low = Math.max(top, Math.ceil(cy - reach)), high = Math.min(bottom, Math.floor(cy + reach));
   for (let j = low; j <= high; j++) {
     const between = stripes & 1 && bare((j - cy) * often + 0.33), dd = (j - cy) * (j - cy), half = Math.sqrt(Math.max(0, reach * reach - dd)), end = Math.min(right, Math.floor(cx + half));
@@ -328,7 +328,7 @@ function drawPath(list, colour, width) {
   marks.beginPath();
   let pen = [NaN, NaN];
   for (const { from: [x0, y0], to: [x1, y1], bend: [bx, by] } of list) {
-    const x = (x0 + x1) / 2 - bx, y = (y0 + y1) / 2 - by; // a parabola is a Bézier curve
+    const x = (x0 + x1) / 2 - bx, y = (y0 + y1) / 2 - by;  // a parabola is a Bézier curve
     copies([Math.min(x0, x1, x), Math.max(x0, x1, x)], [Math.min(y0, y1, y), Math.max(y0, y1, y)], (dx, dy) => {
       const start = [across(x0 + dx), up(y0 + dy)];
       if (!(Math.hypot(start[0] - pen[0], start[1] - pen[1]) <= 0.1)) marks.moveTo(...start);
@@ -349,7 +349,7 @@ function drawArrows() {
     const vx = (VX[i] - ux) * length, vy = (uy - VY[i]) * length, size = Math.hypot(vx, vy);
     if (size < 1) continue;
     const head = Math.min(6 * page.dots, 0.5 * size) / size, reach = size / view.unit;
-    const r = radii[sizeOf[i]], hidden = r < 5 * page.dots ? Math.max(head, 1 - r / size) : 1; // starts at the rim of a small disk
+    const r = radii[sizeOf[i]], hidden = r < 5 * page.dots ? Math.max(head, 1 - r / size) : 1;  // starts at the rim of a small disk
     copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
       const x = across(X[i] + dx) + vx, y = up(Y[i] + dy) + vy;
       marks.moveTo(x - hidden * vx, y - hidden * vy);
@@ -359,7 +359,7 @@ function drawArrows() {
       marks.lineTo(x - head * (vx - 0.5 * vy), y - head * (vy + 0.5 * vx));
     });
   }
-  for (const [colour, width] of [[ink.stage, 3.2], [ink.ink, 1.4]]) { // a light rim makes arrows visible on dark disks
+  for (const [colour, width] of [[ink.stage, 3.2], [ink.ink, 1.4]]) {  // a light rim makes arrows visible on dark disks
     marks.strokeStyle = colour;
     marks.lineWidth = width * page.dots;
     marks.lineCap = marks.lineJoin = 'round';

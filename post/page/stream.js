@@ -5,7 +5,7 @@
 // and then new frames from the worker process.
 // memory for frames [bytes]; numbers before the positions in a message; samples in a plot
 const PAST_ROOM = 6e7, HEAD = 7, MOST_CURVE = 3000;
-const SAME_TIME = 1e-13; // largest relative difference of two times that count as equal
+const SAME_TIME = 1e-13;  // largest relative difference of two times that count as equal
 const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
@@ -50,11 +50,11 @@ const hear = {
       refresh();
       return;
     }
-    stream.scene = { facts, blocks, run }; // the new scene is shown together with its first frame
+    stream.scene = { facts, blocks, run };  // the new scene is shown together with its first frame
   },
   numbers(news) {
     const { curves } = stream, { time } = news;
-    if (time <= curves.time.at(-1)) { // a change at this time
+    if (time <= curves.time.at(-1)) {  // a change at this time
       curves.news[curves.news.length - 1] = news;
       return;
     }
@@ -77,15 +77,15 @@ const hear = {
   },
   state({ playing, ended, reason, changes }) {
     if (film && changes) film.changes = changes.map(([time, name, value]) => [time, name ? `${name} = ${value}` : value]);
-    if (isStarting()) return; // the message belongs to the previous run
-    if (reason && past.length && !state.playing) show(moment.time, true); // a refused disk returns to its place
+    if (isStarting()) return;  // the message belongs to the previous run
+    if (reason && past.length && !state.playing) show(moment.time, true);  // a refused disk returns to its place
     stream.ended = ended;
     if (!playing && state.playing && stream.live && past.length && !parent.isComparing()) play(false);
   },
   problems({ change }) {
-    if (change) return; // a refused change belongs to the previous run
+    if (change) return;  // a refused change belongs to the previous run
     starts(false);
-    if (past.length && !state.playing) show(moment.time, true); // a refused disk or arrow returns to its place
+    if (past.length && !state.playing) show(moment.time, true);  // a refused disk or arrow returns to its place
   },
   gone() { starts(false); stream.ended = true; },
 };
@@ -135,11 +135,11 @@ function take(buffer) {
     document.documentElement.classList.remove('empty');
     origins = frame.place;
     const squares = Array.from({ length: disks }, (_, i) => frame.velocity[2 * i] ** 2 + frame.velocity[2 * i + 1] ** 2).filter(Boolean);
-    setTop(1.5 * Math.sqrt(2 * squares.reduce((sum, one) => sum + one, 0) / squares.length) || 1); // mean over the moving disks
+    setTop(1.5 * Math.sqrt(2 * squares.reduce((sum, one) => sum + one, 0) / squares.length) || 1);  // mean over the moving disks
     move(frame.time);
     begin();
     refresh();
-    if (opens) parent.arrangeAll(); // controls and plots move from the previous film to this one
+    if (opens) parent.arrangeAll();  // controls and plots move from the previous film to this one
     play(!parent.isPaused());
   } else if (!state.playing && follows) {
     show(frame.time, true);
@@ -188,7 +188,7 @@ const fromWorker = {
   newest(next) {
     const { fresh } = stream;
     drawn();
-    if (parent.conducts(window)) return; // compared runs show the same time
+    if (parent.conducts(window)) return;  // compared runs show the same time
     if (stream.live) {
       if (fresh) show(last());
     } else {
@@ -270,7 +270,7 @@ function replay() {
 
 // Shows the film beside others, with a picture of the given size and distance from the left edge of the page, or on the whole
 // page if `size` is missing. A `bare` film has neither controls nor plots.
-let boxSize = null; // { left, width, height } [CSS pixels]
+let boxSize = null;  // { left, width, height } [CSS pixels]
 function arrange(size, bare) {
   boxSize = size;
   document.documentElement.classList.toggle('boxed', !!size);
