@@ -1,6 +1,6 @@
 // ---------- scenes of two to four disks: their velocities, restitution and number ----------
 
-// Called by the film of a run of a few disks.
+// Functions called by the film of a run with few disks.
 const MOST_DISKS = 4;
 function redefine(name, variable, values) { set(`species.${name}.${variable}`, values.join(',')); }
 function restitution() { return numberOf('contact.restitution'); }

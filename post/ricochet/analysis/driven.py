@@ -67,7 +67,10 @@ def temperature_law(run: Run) -> np.ndarray | float | None:
 
 
 def only_moving(run: Run, motion: str) -> int | None:
-    """Return the only moving side if its motion is `motion` and the disks are equal and elastic."""
+    """Return the index of the only moving side, or None.
+
+    None is also returned if its motion is not `motion`, or if the disks are not equal and elastic.
+    """
     moves = [k for k, side in enumerate(run.sides) if side.get("motion", "still") != "still"]
     plain = run.nature <= {"moving_sides", "piston", "walls", "rotating"} and len(moves) == 1
     return moves[0] if plain and run.sides[moves[0]]["motion"] == motion else None

@@ -153,9 +153,9 @@ def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
 def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estimate:
     """Propagate the error of a curve (P,) to a number `of(curve)`, such as the time of a crossing.
 
-    The error is half the difference between the numbers obtained from the curve plus its error and
-    from the curve minus its error. Mean and error are NaN if one of these numbers is, or if the
-    curve has no error.
+    The number is calculated for the curve plus and for the curve minus its error, and half of the
+    difference is its error. Mean and error are NaN if one of these numbers is, or if the curve has
+    no error.
     """
     first, last = (of(curve.mean + sign * curve.error) for sign in (-1, 1))
     error = abs(last - first) / 2

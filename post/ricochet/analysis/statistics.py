@@ -195,10 +195,11 @@ def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
     """Return standard error of the mean and degrees of freedom of an anticorrelated series (T,).
 
     The running sum of such a series is bounded: an example is the momentum of a gas, to which two
-    walls add impulses. The ends of the running sum contribute to the power of a Fourier transform
-    as much as to the variance of the mean, but twice as much to that of a cosine transform. The
-    power rises as the square of the frequency. The smaller the inefficiency `per_sample`, the fewer
-    coefficients are used, so that the relative bias stays the same.
+    walls add impulses. Its two ends contribute equally to the variance of the mean and to the power
+    of a Fourier transform, but twice as much to the power of a cosine transform, which would
+    therefore overestimate the variance. The power rises as the square of the frequency. The smaller
+    the inefficiency `per_sample`, the fewer coefficients are used, so that the relative bias stays
+    the same.
     """
     most = min(MOST_WAVES, len(parts) // 2) // 2
     pairs = int(np.clip(round(len(parts) * per_sample**0.5 / (2 * PER_WAVE)), 1, max(1, most)))
@@ -238,8 +239,8 @@ def equilibration(series: np.ndarray) -> int:
 def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     """Average the means of independent runs.
 
-    The error is propagated from the errors of the runs, or estimated from the scatter of the means
-    if a run has no error or if the means scatter by more than their errors explain.
+    The error is propagated from the errors of the runs. It is estimated from the scatter of the
+    means instead if a run has no error, or if the means scatter by more than their errors explain.
 
     Parameters
     ----------

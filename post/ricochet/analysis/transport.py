@@ -72,9 +72,10 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 
 
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
-    """Return the lag, in frames, in which sound crosses the box, or 1/8 of the run if shorter.
+    """Return the lag, in frames, at which D is measured.
 
-    At longer lags diffusion depends on the size of the box.
+    It is the time in which sound crosses the box, but at most 1/8 of the shortest run. At longer
+    lags diffusion depends on the size of the box.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
     kt = td.temperature(run).mean

@@ -199,8 +199,8 @@ def curves(run: Run) -> dict:
     """Return the energy of each species and the pressure as functions of time, for small plots.
 
     They are based on the observables, which are sampled more often than frames. Missing values, and
-    the pressure before the first collision, are None. For an open system, the numbers of disks
-    inside, and of those that have left and entered, are included.
+    the pressure before the first collision, are None. For an open system, the curves include the
+    number of disks inside, and the numbers that have left and entered.
     """
     series, found = {}, {}
     moved = passages(run.observables) if "open" in run.nature else {}

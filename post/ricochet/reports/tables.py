@@ -122,8 +122,8 @@ def text_of(table: Table) -> str:
 def once(notes: Iterable[str], names: set[str]) -> list[str]:
     """Return the warnings without repetitions.
 
-    Of several that differ only in names of runs and in numbers, the first is returned with their
-    count.
+    If several differ only in names of runs and in numbers, only the first of them is returned, with
+    their count.
     """
     kinds: dict[str, list[str]] = {}
     for note in notes:

@@ -6,8 +6,8 @@
 
 A sweep can be interrupted at any time; the same call continues it. Its folder contains input.nml,
 manifest.txt with the overrides of each member run, and NAME.h5 and NAME.log for each member run.
-`runs/ensemble.sh` writes the same files, so that a sweep started by one of the two can be continued
-by the other.
+`runs/ensemble.sh` writes the same files, so that either of the two can continue a sweep of the
+other.
 """
 
 import contextlib

@@ -20,7 +20,7 @@ from ..tables import over_runs
 
 
 def table(groups: list[Group], skip: float | None) -> tuple[list[dict[str, Any]], list[str]]:
-    """Return a table row for each number of disks and packing fraction, and warnings."""
+    """Return a table row for each number of disks and packing fraction, and a list of warnings."""
     rows, warnings = [], []
     for group in groups:
         for eta, same in by_packing(group.runs):
