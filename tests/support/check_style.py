@@ -46,17 +46,18 @@ WORDS = (
 KEYWORD = re.compile(rf"\b(?:{'|'.join(WORDS.split())})\b", re.IGNORECASE)
 EMPTY_WORDS = re.compile(r"(?:get|set(?!_in_)|do|handle)_|(?:\w+_)?(?:manager|utils?)(?:_|$)")
 MACHINE_PATH = re.compile(r"""(?:^|[\s"'=(:])/(?:home|root|Users|work|tmp|mnt|scratch)/\w""")
-# The help text of a variable begins with a capitalised noun that names the quantity, and not with a
+# The help text of a variable begins with a capitalised noun that names the quantity, not with a
 # preposition, pronoun or verb.
 HELP = re.compile(r'variable_t\("(\w*)", "(\w+)", "\w+", \d+, "\w+", "[^"]*",[ &\n]*"(\w*)')
 NO_NOUN = {"Of", "In", "On", "At", "By", "With", "For", "From", "To", "How", "Whether", "When"}
 NO_NOUN |= {"What", "That", "Those", "Where", "Which", "Use", "Set", "Give", "The", "It", "This"}
-# If a sentence begins with one of these words, its subject is a clause or a pronoun and not a noun.
+# After one of these words at its beginning, the subject of a sentence is a clause or a pronoun, not
+# a noun.
 NO_SUBJECT = re.compile(
     r"(?:^|[.!?] +)((?:What|Whom)\b(?![^.]*\?)|That which\b|(?:That|Those) (?:of|that|in)\b)"
 )
 # Each of these expressions occurred in several sentences that readers misunderstood, and no correct
-# sentence requires them.
+# sentence needs it.
 DENIED = {
     r"by turns": "alternately, or interleaved",
     r"\bof late[,.;]": "recently",

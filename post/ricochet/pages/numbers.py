@@ -17,13 +17,13 @@ from ..reading.records import Change
 from ..running.simulation import Simulation
 
 FEW_DISKS = 20  # largest number of disks whose next events are sent
-PISTON_MARGIN = 0.2  # region beyond a piston that is shown [largest edge of the box]
-FEWEST = 40  # smallest number of samples of a mean with an error
+PISTON_MARGIN = 0.2  # width of the region shown beyond a piston [longest edge of the box]
+FEWEST = 40  # fewest samples of a mean with an error
 TURNS = "angular_velocity"
-KEPT = 5  # quantities at the start of a sample that are not averaged
-FEWEST_FREEDOM = 4  # smallest number of degrees of freedom of an error
-DECAYS = 5  # smallest duration of a mean in decay times of slow fluctuations
-POINTS = 200  # largest number of samples from which a decay time is determined
+KEPT = 5  # leading quantities of a sample, which are not averaged
+FEWEST_FREEDOM = 4  # fewest degrees of freedom of an error
+DECAYS = 5  # shortest duration of a mean, in decay times of slow fluctuations
+POINTS = 200  # largest number of samples used to determine a decay time
 
 
 @dataclass(frozen=True)
@@ -233,7 +233,8 @@ def theory(run: Run, energy: float, measured: float | None) -> list[float | None
         return law
     sizes = [(kind.disks.sum(), kind.radii.mean()) for kind in run.by_species]
     area = float(np.prod(run.edges))
-    rest = (drift - axes / 2 * kt) / area  # the observable contains the kinetic energy, not n kT
+    # the kinetic part of the observable is the kinetic energy, which differs from n kT
+    rest = (drift - axes / 2 * kt) / area
     pressure = kt * virial_pressure(*zip(*sizes, strict=True), run.edges, ~run.periodic)
     return [*law[:-2], pressure + rest, count * kt / area + rest]
 
