@@ -184,10 +184,7 @@ class PseudoValues(NamedTuple):
         return np.where(seen.sum(axis=0) > 1, mean, np.nan)
 
     def rests(self) -> np.ndarray:
-        """Return weighted deviations (G, ...) of the pseudo-values from their mean.
-
-        The sum of their squares is the squared error of the mean.
-        """
+        """Return deviations (G, ...) from the mean, whose squares add up to its squared error."""
         seen = self.share > 0
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))

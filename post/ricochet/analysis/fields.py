@@ -447,10 +447,7 @@ def expected(
 
 
 def has_theory(runs: list[Run], axis: int) -> bool:
-    """Return whether Enskog's theory applies to the gas between the walls perpendicular to an axis.
-
-    There must be no other walls, and the disks must be smooth, elastic and of one species.
-    """
+    """Return whether Enskog's theory applies: two opposite walls, equal smooth elastic disks."""
     return all(
         not run.periodic[axis] and run.periodic[1 - axis] and run.nature <= LAWFUL for run in runs
     )

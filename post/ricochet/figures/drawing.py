@@ -93,10 +93,7 @@ def by_chance(runs: list[Run]) -> set[str]:
 
 
 def count_at(run: Run, frame: int) -> dict[str, int]:
-    """Return the number of events or collisions before a frame, by its name, if it is known.
-
-    It is unknown if the number of frames shows that the sampling schedule changed during the run.
-    """
+    """Return the number of events or collisions before a frame; {} if the schedule changed."""
     schedule = run.parameters.get("output", {})
     counted = {"events": ["collisions", "side_collisions", "obstacle_collisions"]}
     counted["collisions"] = counted["events"][:1]

@@ -19,10 +19,7 @@ LAB_MODULES = ("sliders", "values", "lab", "disks", "doors")
 
 
 def page(run: Run, film: dict | None) -> str:
-    """Return the web page of a film.
-
-    If `film` is None, the page requests the film from the server of the option --live.
-    """
+    """Return the web page of a film; None stands for a film from the server of --live."""
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
     words = {
@@ -40,10 +37,7 @@ def view() -> str:
 
 
 def paged(film: dict | None, words: dict[str, str]) -> str:
-    """Return a film page with the given texts.
-
-    If `film` is None, the page requests the film from its server.
-    """
+    """Return a film page with the given texts; None stands for a film from its server."""
     style = text_of("style.css")
     script = "\n".join(text_of(f"{name}.js") for name in MODULES)
     fillings = {name: html.escape(text) for name, text in words.items()} | {

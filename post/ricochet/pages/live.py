@@ -60,10 +60,7 @@ async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse
 
 
 def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Application:
-    """Return a web application with a function for each path.
-
-    `frames` lists the origins of web pages that may embed its pages in an HTML frame.
-    """
+    """Return a web application for the paths; `frames` lists origins that may embed its pages."""
     app = web.Application(middlewares=[guarded], client_max_size=LONGEST)
     app[SERVER] = {"heard": set()}  # connections that have sent a request
     app.add_routes([web.get(path, handler) for path, handler in paths.items()])

@@ -57,10 +57,7 @@ def check_index(path: Path) -> None:
 
 
 def check_counts(file: Any, path: Path, frame: int) -> None:
-    """Raise ValueError if a frame of a GSD file counts more members than the file has bytes.
-
-    The first frame is checked, too, because gsd always reads it.
-    """
+    """Raise ValueError if this or the first frame counts more members than the file has bytes."""
     for name in (f"{group}/N" for group in GROUPS):
         for k in {0, frame}:
             if not file.chunk_exists(frame=k, name=name):

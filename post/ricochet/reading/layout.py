@@ -31,10 +31,7 @@ def series_of(file: h5py.File, name: str, count: int) -> Series:
 
 
 def committed(file: h5py.File, group: str) -> int:
-    """Return the number of complete samples in a group.
-
-    An unfinished file has allocated space, with invalid numbers, for further samples.
-    """
+    """Return the number of complete samples in a group, which may have space for further ones."""
     return int(file[group]["committed"][()])
 
 

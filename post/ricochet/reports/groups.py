@@ -61,10 +61,7 @@ LONGEST = 40  # longest value in a warning [letters]
 
 
 def differences(groups: Iterable[Sequence[Run]], expected: Collection[str] = ()) -> list[str]:
-    """Return a warning if runs within a group differ in the values of physical parameters.
-
-    `expected` lists groups and variables of the input that may differ.
-    """
+    """Return a warning if runs within a group differ in physics other than `expected` variables."""
     found: dict[str, dict[str, None]] = {}
     for runs in groups:
         each = [physics(run, expected) for run in runs] if len(runs) > 1 else []

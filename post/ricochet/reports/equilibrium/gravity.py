@@ -271,10 +271,7 @@ def draw_laws(axes: plt.Axes, result: Result, kind: str, logarithmic: bool) -> N
 
 
 def draw(result: Result) -> Sheet:
-    """Plot histograms of squared speeds (top) and heights (bottom).
-
-    The left panels have linear axes, the right ones logarithmic axes.
-    """
+    """Plot squared speeds (top) and heights (bottom) on linear and on logarithmic axes."""
     run, row, rows = result.runs[0], result.table[0], []
     for kind, name in (("speed", "speeds"), ("height", "heights")):
         linear = Panel(name, draw_laws, (result, kind, False), aspect=0.75)

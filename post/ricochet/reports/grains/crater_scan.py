@@ -226,10 +226,7 @@ def draw_size(
 def draw_sizes(
     axes: plt.Axes, result: Result, axis: str, names: dict[str, str], own: Sequence[str]
 ) -> None:
-    """Plot several crater sizes against a parameter.
-
-    Colours distinguish the curves or, if there is only one, the sizes.
-    """
+    """Plot several crater sizes against a parameter, with colours for curves or else for sizes."""
     scan, run = result.values[axis], result.runs[0]
     shared = [others(axis, curve) for curve in scan]
     varying = [name for name in shared[0] if len({values[name] for values in shared}) > 1]
