@@ -4,6 +4,7 @@ module run
   use sampling_schedule, only: progress_t
   use checkpoint, only: read_checkpoint, recall_overrides
   use command_line, only: command_t
+  use epochs, only: stays_at_rest
   use errors, only: error_t, exit_broken, exit_files, exit_finished, exit_stopped, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
@@ -172,8 +173,12 @@ contains
 
     text = run%evolution%warning(run%sim)
     if (text /= "") write (error_unit, "(a)") "warning: "//text
-    if (run%input%settings%stop%energy_fraction > 0 .and. .not. run%sim%start_energy > 0) write (error_unit, "(a)") &
-      "warning: stop.energy_fraction: no disk moves at the start, so that the rule is met at once"
+    if (run%input%settings%stop%energy_fraction > 0 .and. .not. run%sim%start_energy > 0) then
+      write (error_unit, "(a)") "warning: stop.energy_fraction: no disk moves at the start, so that the rule is met at once"
+    else if (stays_at_rest(run%sim)) then
+      write (error_unit, "(a)") "warning: no events are possible: no disk moves at the start, and nothing sets disks in motion; " &
+        //"velocities are set with species.speed, temperature or velocity"
+    end if
   end subroutine warn
 
   !> Advances the simulation to the end of the run and measures the speed of the program.

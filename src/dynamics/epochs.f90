@@ -11,6 +11,7 @@ module epochs
   implicit none
   private
   public :: are_crushed, restart_epoch, begin_first_epoch, ends_by_event, ends_by_kick, is_at_rest, last_time, most_events
+  public :: stays_at_rest
   public :: disk_on_side, has_come_to_rest, move_epoch, stands_still
 
   !> Intended number of collisions per disk in an epoch. Moving the time origin at the end of each
@@ -298,6 +299,17 @@ contains
       if (.not. yes) return
     end do
   end function is_at_rest
+
+  !> Whether all disks are at rest, and no gravity, shear, moving side, driving, source or scheduled
+  !> change can set them in motion.
+  pure function stays_at_rest(sim) result(yes)
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = .not. (sim%box%has_gravity() .or. sim%box%is_sheared() .or. any(sim%box%side%moves()) .or. allocated(sim%drive) &
+      .or. allocated(sim%source) .or. allocated(sim%schedule))
+    if (yes) yes = is_at_rest(sim)
+  end function stays_at_rest
 
   !> The disk of lowest id that rests on a side while other disks move; 0 if there is none. The last
   !> event of the disk and its next bounce on a dissipative side are both within `negligible_time`

@@ -17,6 +17,9 @@ module input_text
   integer, private :: i
   character(len=1), parameter :: control(*) = [(achar(i), i=0, 8), achar(11), achar(12), (achar(i), i=14, 31), achar(127)]
 
+  !> First bytes of an HDF5 file (HDF5 File Format Specification, section II.A)
+  character(len=*), parameter :: hdf5_signature = achar(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
+
   !> Kinds of tokens. A single character such as & or = is a kind of its own; the kind of a quoted
   !> string is its quotation mark.
   character(len=1), parameter :: word = "w", unclosed = "u", junk = "?", ending = "e"
@@ -58,6 +61,9 @@ contains
       call fail(error, exit_files, path//": is a folder, not an input file")
     else if (bytes == 0) then
       call fail(error, exit_usage, path//": is empty, or a pipe or a device instead of a file")
+    else if (is_hdf5(path)) then
+      call fail(error, exit_usage, path//": is an HDF5 file, but an input is a text file; to continue a run, repeat its command " &
+        //"with --resume: ricochet INPUT.nml -o "//path//" --resume")
     else if (bytes > largest_file) then
       call fail(error, exit_usage, path//": has "//written(bytes)// &
         " bytes; an input file has at most "//written(largest_file))
@@ -72,6 +78,23 @@ contains
     if (odd > 0) call fail(error, exit_usage, path//": is not a text file: byte "//written(odd)// &
       " is a control character, code "//written(iachar(text(odd:odd))))
   end subroutine read_text
+
+  !> Whether a file begins like an HDF5 file, such as the output of a run; false if it cannot be
+  !> read.
+  function is_hdf5(path)
+    character(len=*), intent(in) :: path
+    logical :: is_hdf5
+    character(len=len(hdf5_signature)) :: start
+    integer :: unit, status
+
+    start = ""
+    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old", iostat=status)
+    is_hdf5 = status == 0
+    if (.not. is_hdf5) return
+    read (unit, iostat=status) start
+    close (unit)
+    is_hdf5 = status == 0 .and. start == hdf5_signature
+  end function is_hdf5
 
   !> Suggests an existing input file if the path only lacks the extension or the folder `input`.
   function advice(path)

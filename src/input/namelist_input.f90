@@ -5,6 +5,7 @@ module namelist_input
   use input_problems, only: most_problems, problem_list_t
   use input_words, only: store_values
   use input_text, only: assignment_t, content, cut, ending, plain, token_t, unclosed, unix_lines, word
+  use looked_up_words, only: meant_variables
   use partners, only: n_sides, side_name
   use old_names, only: new_name
   use texts, only: digits, eol, joined, lower_case, shown, suggestion, text_t, written
@@ -446,6 +447,7 @@ contains
     end if
     advice = suggestion(name, variables_of(group))
     if (full_names(name) /= "") advice = "did you mean "//full_names(name)//"?"
+    if (size(meant_variables(name)) > 0) advice = "did you mean "//joined(meant_variables(name), " or ")//"?"
     call self%problems%add(line, trim(group)//"."//plain(name), "unknown variable; "//advice)
   end subroutine report_unknown
 

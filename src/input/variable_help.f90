@@ -4,6 +4,7 @@ module variable_help
   use choices, only: meaning_of
   use errors, only: error_t, exit_usage, fail
   use input_groups, only: group_t, json_text
+  use looked_up_words, only: meant_variables, word_length
   use old_names, only: present_names
   use variables, only: allowed, either, excluded_by, first_sentence, group_names, in_motion, is_repeated, largest, name_length, &
     on_resume, smallest, table, variable_t, wall_groups, words_of
@@ -72,12 +73,13 @@ contains
   end function padded
 
   !> Output of `--explain`. The topic is a variable, with or without its group, or a group. Any
-  !> other topic is searched for in names, keywords and help texts.
+  !> other topic is searched for in names, keywords and help texts. The variables that a user may
+  !> mean by the topic are listed, too.
   pure subroutine explain(name, text, error)
     character(len=*), intent(in) :: name
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: wanted, now
+    character(len=:), allocatable :: wanted, now, meant
     character(len=name_length + 9) :: names(size(table)), full(size(table))
     logical :: of_group(size(table))
     integer :: k
@@ -92,10 +94,14 @@ contains
       explanations(pack([(k, k=1, size(table))], names == wanted .or. full == wanted))
     if (text /= "") then
       text = text(:len(text) - len(eol))
+      if (size(meant_variables(wanted)) > 0) text = text//eol//"see also"//eol//summaries(meant_variables(wanted))
       return
     end if
     now = present_names(wanted, of_choices=.false.)
     if (now == "") text = matches(wanted)
+    meant = summaries(meant_variables(wanted))
+    if (meant /= "" .and. text /= "") text = eol//text
+    text = meant//text
     if (text /= "") return
     if (now == "") now = present_names(wanted, of_choices=.true.)
     if (now /= "") then
@@ -131,6 +137,23 @@ contains
     last = index(bare, ".", back=.true.)
     if (last > first) bare = bare(:first)//bare(last + 1:)
   end function bare
+
+  !> One line for each of several variables, with the first sentence of its help text.
+  pure function summaries(names) result(text)
+    character(len=word_length), intent(in) :: names(:)     !! full names
+    character(len=:), allocatable :: text
+    integer :: n, k
+
+    text = ""
+    do n = 1, size(names)
+      do k = 1, size(table)
+        associate (full => trim(table(k)%group)//"."//trim(table(k)%name))
+          if (full == names(n)) text = text//eol//full//": "//first_sentence(table(k)%help)
+        end associate
+      end do
+    end do
+    text = text(min(len(eol), len(text)) + 1:)
+  end function summaries
 
   !> Search results of `--explain`: all variables with the wanted text in the name or help text, and
   !> all keywords with the wanted text in the keyword or its meaning.

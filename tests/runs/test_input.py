@@ -252,6 +252,9 @@ def test_all_problems_come_at_once_and_the_last_line_says_so_too(checked):
     [
         (b"", "gas.nml: is empty, or a pipe or a device instead of a file"),
         (b"\n", "gas.nml: species: the input has no &species"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(9), "repeat its command with --resume"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(5_000_000), "is an HDF5 file"),
+        (b"&box wall_temperature = 1 /", "did you mean side.temperature or wall.temperature"),
         (bytes(range(256)), "is not a text file: byte 1"),
         (GOOD.encode("utf-16"), "is not a text file"),
         (b"\xff\xfe" + GOOD.encode(), "text outside a group"),
@@ -274,6 +277,23 @@ def test_absurd_files_are_refused_in_time_with_short_messages(checked, content, 
     assert run.returncode == USAGE
     assert said in run.stderr
     assert all(len(line) < 400 for line in lines_of(run))
+
+
+@pytest.mark.parametrize(
+    ("more", "stays"),
+    [
+        ("", True),
+        ("&side name = 'left' temperature = 1 /", True),
+        ("&box gravity = 0, -1 /", False),
+        ("&side name = 'left' motion = 'sine' amplitude = 0.1 period = 1 /", False),
+        ("&drive kind = 'noise' interval = 1 strength = 1 /", False),
+        ("&change time = 1 set = 'box.gravity=0,-1' /", False),
+    ],
+)
+def test_a_check_reports_disks_that_nothing_sets_in_motion(checked, more, stays):
+    run = checked(f"&species count = 5 radius = 0.01 /\n{more}\n&stop time = 2 /")
+    assert run.returncode == 0, run.stderr
+    assert ("no events are possible" in run.stderr) == stays
 
 
 def test_four_megabytes_of_positions_are_read_in_time(checked, tmp_path):
@@ -332,6 +352,9 @@ def test_explain_finds_the_words_of_users_or_names_the_documentation(ricochet):
     assert "sqrt(d/g)" in ricochet("--explain", "contact_time").stdout.replace("\n", " ")
     run = ricochet("--explain", "tracers")
     assert run.returncode == USAGE and "make docs" in run.stderr
+    for word in ("heat", "wall", "wall_temperature"):
+        run = ricochet("--explain", word)
+        assert run.returncode == 0 and re.search(r"^(side\.temper|box\.bound)", run.stdout, re.M)
 
 
 @pytest.mark.parametrize("command", [["--help"], ["--version"], ["--explain", "restitution"]])
