@@ -1,4 +1,4 @@
-"""Disks that come to rest: the stop rule `stop.at_rest`, and messages if time does not advance."""
+"""Disks that come to rest: the stop condition `stop.at_rest`, and messages if time stops."""
 
 import re
 from math import pi, sqrt, tan
@@ -23,7 +23,7 @@ COMMAND = ["gas.nml", "-o", "gas.h5"]
 @pytest.mark.parametrize("restitution", [0, 0.1, 0.5, 0.9, 0.98])
 @pytest.mark.parametrize("rule", ["", "wall_rule = 'normal'"])
 def test_a_ball_comes_to_rest_when_its_bounces_have_ended(ricochet, tmp_path, restitution, rule):
-    """The ball comes to rest at the time predicted by the geometric series of its bounces."""
+    """The geometric series of its bounces predicts the time at which the ball comes to rest."""
     write_input(tmp_path, BALL.format(height=2, restitution=restitution, more=rule))
     run = ricochet(*COMMAND)
     assert run.returncode == FINISHED and "note" not in run.stderr + run.stdout
@@ -39,7 +39,7 @@ def test_a_ball_comes_to_rest_when_its_bounces_have_ended(ricochet, tmp_path, re
 
 
 def test_a_run_that_comes_to_rest_ends_alike_in_all_ways(ricochet, tmp_path):
-    """The run ends equally in parts, with another search and event queue, and in memory."""
+    """The end is the same in parts, with another search and event queue, and in memory."""
     write_input(tmp_path, BALL.format(height=2, restitution=0.7, more=""))
     assert ricochet(*COMMAND).returncode == FINISHED
     other = ["--set=run.search='pairs'", "--set=run.queue='heap'", "--set=run.threads=2"]
@@ -70,7 +70,7 @@ PAIR = """&box gravity = 0, -1 upper = 2, 2 /
 
 
 def test_a_disk_that_rests_while_another_moves_breaks_the_run_off(ricochet, tmp_path):
-    """If one disk comes to rest while another disk moves, the run ends with a message."""
+    """If one disk comes to rest while another moves, the run aborts with a message."""
     write_input(tmp_path, PAIR.format(height=1.3))
     run = ricochet(*COMMAND)
     assert run.returncode == BROKEN and "disk 1 (ball) and the bottom side" in one_line(run)
@@ -84,7 +84,7 @@ def test_a_disk_that_rests_while_another_moves_breaks_the_run_off(ricochet, tmp_
 def test_a_disk_that_rests_beside_a_moving_one_ends_a_run_alike_whatever_stops_it(
     ricochet, tmp_path, rest
 ):
-    """The last event gives the message of the last time; a disk that still bounces gives none."""
+    """The last event yields the message of the last time; a disk that still bounces yields none."""
     write_input(tmp_path, PAIR.format(height=1.3))
     at_rest = f"--set=stop.at_rest={rest}"
     by_time = ricochet(*COMMAND, at_rest, "--set=stop.time=9")
@@ -101,7 +101,7 @@ def test_a_disk_that_rests_beside_a_moving_one_ends_a_run_alike_whatever_stops_i
 
 
 def test_the_next_collision_of_a_falling_row_is_with_a_disk_and_not_with_a_side(program, tmp_path):
-    """A run ends between collisions that take no time.  A library with run-time checks is used."""
+    """A run ends between collisions that take no time. A library with run-time checks is used."""
     write_input(
         tmp_path,
         """&box lower = -9, -9 upper = 9, 9 gravity = 0, -1e-3 /
@@ -160,7 +160,7 @@ def test_sliding_along_a_ring_is_named(ricochet, tmp_path, velocity, contact_tim
 
 
 #: Systems with an inelastic collapse: a bouncing ball, two balls on top of each other, a row of
-#: disks that is struck, and a row that is pressed against a container.
+#: disks that is struck, and a row pressed against a container.
 COLLAPSES = {
     "ball": PAIR.replace("1.5, {height}", "1.5, 0.7").replace("at_rest = .true.", "time = 9"),
     "tower": """&box gravity = 0, -1 / &contact restitution = 0.6 / &stop time = 9 /
@@ -197,7 +197,7 @@ def test_the_contact_time_that_is_proposed_prevents_the_collapse(
 
 @pytest.mark.parametrize("stop", ["events=5000", "events=250", "time=9"])
 def test_disks_at_rest_end_a_run_alike_whatever_stops_it(ricochet, tmp_path, stop):
-    """A ball at rest ends the run with the same message, also in memory."""
+    """A ball at rest ends the run with the same message, even in memory."""
     write_input(tmp_path, BALL.format(height=2, restitution=0.5, more=""))
     run = ricochet(*COMMAND, "--set=stop.at_rest=.false.", f"--set=stop.{stop}")
     assert run.returncode == BROKEN and "disk 1 (ball) and the bottom side" in one_line(run)
@@ -207,7 +207,7 @@ def test_disks_at_rest_end_a_run_alike_whatever_stops_it(ricochet, tmp_path, sto
 
 
 def test_bounces_lower_than_the_spacing_of_the_coordinates_are_rest(ricochet, tmp_path):
-    """In a symmetric corner rounding errors make the bounces of a disk endless."""
+    """In a symmetric corner, rounding errors would make a disk bounce endlessly."""
     write_input(
         tmp_path,
         """&box gravity = 0, -1 / &wall points = 0.3, 0.7, 0.5, 0.5, 0.7, 0.7 /

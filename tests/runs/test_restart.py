@@ -1,6 +1,6 @@
-"""Stopped, damaged and finished runs continue exactly, or state why they cannot continue.
+"""Stopped, damaged and finished runs continue exactly, or state why they cannot.
 
-`test_random_systems.py` tests with random systems that continued runs have bit-identical results.
+`test_random_systems.py` tests with random systems that continued runs are bit-identical.
 """
 
 import random
@@ -44,7 +44,7 @@ def before(request, ricochet, tmp_path):
 
 
 def test_stops_between_and_at_samples_and_before_the_first_event(ricochet, tmp_path):
-    """A run can be stopped and continued at any point; here wall time limits each part."""
+    """A run can be stopped and continued at any point; here, wall time limits each part."""
     write_input(tmp_path, GAS + GROWING)
     short = ["gas.nml", "--set", "species.gas.count=3", "--set", "species.gas.radius=0.15"]
     short += ["--set", "run.search='pairs'", "--set", "stop.time=1", "-o"]
@@ -108,7 +108,7 @@ def flip(path, slot, rng):
 
 @pytest.mark.parametrize("trials", [10, pytest.param(200, marks=CHECK)])
 def test_of_two_checkpoints_one_may_be_damaged(ricochet, tmp_path, trials):
-    """If one checkpoint is damaged, the run continues from the other checkpoint."""
+    """If one checkpoint is damaged, the run continues from the other."""
     write_input(tmp_path, MIXTURE)
     assert ricochet("gas.nml", "-o", "whole.h5", "--set", "stop.time=1").returncode == FINISHED
     command, rng = [*COMMAND, "--set", "stop.time=1"], random.Random(trials)
@@ -128,7 +128,7 @@ def test_of_two_checkpoints_one_may_be_damaged(ricochet, tmp_path, trials):
 
 @pytest.mark.parametrize("trials", [6, pytest.param(200, marks=CHECK)])
 def test_a_file_that_is_damaged_is_refused_in_one_line(ricochet, before, trials):
-    """A truncated, missing or foreign file, or one without valid checkpoints, is refused."""
+    """The file is truncated, missing or foreign, or has no valid checkpoint."""
     whole = before.read_bytes()
     for k in range(trials):
         before.write_bytes(whole[: k * len(whole) // trials])
@@ -152,7 +152,7 @@ def test_a_file_that_is_damaged_is_refused_in_one_line(ricochet, before, trials)
 
 
 def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp_path):
-    """A run that ended with an error keeps its last state, but cannot be resumed."""
+    """An aborted run keeps its last state, but cannot be resumed."""
     write_input(tmp_path, COLLAPSE)
     run = ricochet("gas.nml", "-o", "gas.h5", "--quiet")
     assert run.returncode == BROKEN and "collapse" in one_line(run)
@@ -176,7 +176,7 @@ def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp
 
 
 def test_a_run_that_passed_a_collapse_says_so(ricochet, tmp_path):
-    """All outputs report the collapse, and the proposed contact time prevents the collapse."""
+    """All outputs report the collapse, and the proposed contact time prevents it."""
     crater = [CRATER, "-o", tmp_path / "crater.h5", "--force"]
     run = ricochet(*crater, "--set=contact.contact_time=0", "--set=output.event_log=T")
     found = contents(tmp_path / "crater.h5")
@@ -193,7 +193,7 @@ def test_a_run_that_passed_a_collapse_says_so(ricochet, tmp_path):
     assert run.returncode == FINISHED and "collapse" not in run.stderr + run.stdout
 
 
-#: Disks that touch each other in a row, a triangle and two lattices, and a disk that strikes them.
+#: Touching disks in a row, a triangle and two lattices, and a disk that strikes them.
 DIAGONAL = 0.125 * 3**0.5 / 2
 TOUCHING = {
     "cradle": [(0.75 + 0.125 * k, 1) for k in range(5)],
@@ -213,7 +213,7 @@ TOUCHING = {
 @pytest.mark.parametrize("restitution", [0.75, 0.9, 0.95, 0.999])
 @pytest.mark.parametrize("name", TOUCHING)
 def test_disks_that_touch_and_are_struck_are_no_collapse(ricochet, tmp_path, name, restitution):
-    """No collapse is reported if touching disks are struck, and the scripts accept the run."""
+    """No collapse is reported when touching disks are struck, and the scripts accept the run."""
     places = [(0.125, 1), *TOUCHING[name]]
     write_input(
         tmp_path,
@@ -324,7 +324,7 @@ def test_a_check_of_a_run_that_goes_on_changes_nothing(ricochet, before):
 
 
 def test_a_finished_run_that_is_continued_needs_room(ricochet, small_disk, tmp_path):
-    """If the file system has too little space, the existing run is not changed."""
+    """If there is too little space on the file system, the existing run is unchanged."""
     disk = small_disk(2000)
     write_input(tmp_path, MIXTURE)
     command = ["gas.nml", "-o", "disk/gas.h5", "--quiet", "--set"]
@@ -340,7 +340,7 @@ def test_a_finished_run_that_is_continued_needs_room(ricochet, small_disk, tmp_p
 
 
 def test_a_run_knows_its_overrides(ricochet, tmp_path):
-    """A continued run uses stop rules and schedules of its command, and all earlier overrides."""
+    """It uses stop conditions and schedules of its own command, and all earlier overrides."""
     write_input(tmp_path)
     fixed = ["run.seed=8", "species.heavy.mass=7", "Contact.restitution=0.9", "run.title=a = b"]
     sets = [f"--set={word}" for word in fixed]
@@ -348,7 +348,8 @@ def test_a_run_knows_its_overrides(ricochet, tmp_path):
     assert ricochet(*COMMAND, *sets, *AT_ONCE).returncode == STOPPED
     run = ricochet(*COMMAND, "--resume", "--set=species.heavy.mass=8")
     assert run.returncode == USAGE and "species.heavy.mass" in one_line(run)
-    for time, said in ((1, []), (2, ["--set=species.heavy.mass=7"])):  # a stopped, a finished one
+    # a stopped and a finished run
+    for time, said in ((1, []), (2, ["--set=species.heavy.mass=7"])):
         options = [*said, "--set=run.title=a = b", f"--set=stop.time={time}"]
         run = ricochet(*COMMAND, "--resume", *options)
         assert run.returncode == FINISHED, run.stderr

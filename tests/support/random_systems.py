@@ -402,7 +402,7 @@ class Draw:
         self.columns += ["omega", "angle"] if self.turns else []
         return "&species name = 's0' file = 'start.txt' /"
 
-    # --- dynamics, stop rules and output ---
+    # --- dynamics, stop conditions and output ---
 
     def contact(self) -> str:
         rng = self.rng
