@@ -16,7 +16,7 @@ from ..result import Result
 
 
 def moving_and_resting(run: Run) -> tuple[int, int]:
-    """Return the indices of the disk that moves at the start and of the disk that is at rest."""
+    """Return the indices of the initially moving and of the resting disk."""
     moving = np.flatnonzero(run.speed(0))
     if run.n_disks != 2 or len(moving) != 1:
         raise Refused(f"{run.path}: needs two disks, one of them at rest")
@@ -24,7 +24,7 @@ def moving_and_resting(run: Run) -> tuple[int, int]:
 
 
 def law_of(run: Run) -> tuple[float, float]:
-    """Return the mass of the resting over that of the moving disk, and the restitution."""
+    """Return the mass of the resting disk over that of the moving one, and the restitution."""
     moving, resting = moving_and_resting(run)
     return float(run.mass[resting] / run.mass[moving]), run.restitution
 
@@ -49,7 +49,7 @@ def scattering(run: Run) -> dict[str, float]:
 
 
 def draw_angles(axes: plt.Axes, result: Result) -> None:
-    """Draw the scattering angle, and the exact angle for each mass ratio and restitution."""
+    """Plot the scattering angle, with the exact angle for each mass ratio and restitution."""
     s, angle = column(result, "b_over_R12"), column(result, "angle_degrees")
     end = max(1.2, np.abs(s).max())
     fine = np.linspace(-end if s.min() < 0 else 0, end, 2401)
@@ -68,7 +68,7 @@ def draw_angles(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_errors(axes: plt.Axes, result: Result) -> None:
-    """Draw the deviation of the scattering angle from the exact angle."""
+    """Plot the deviation of the scattering angle from the exact one."""
     s, error = column(result, "b_over_R12"), column(result, "error_degrees")
     axes.semilogy(s, np.maximum(error, 1e-16), ls="", marker=".", color=COLOURS[0])
     axes.set(xlabel="impact parameter $b/R_{12}$", ylabel="|error| (degrees)")
@@ -81,13 +81,13 @@ def column(result: Result, name: str) -> np.ndarray:
 
 
 def draw(result: Result) -> Sheet:
-    """Draw the scattering angle and its error."""
+    """Plot the scattering angle and its deviation from the exact one."""
     angles = Panel("angles", draw_angles, (result,), aspect=0.6)
     return Sheet([[angles], [Panel("errors", draw_errors, (result,), 0.3, share_x="angles")]])
 
 
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
-    """Return the scattering angles, in the order of the impact parameter."""
+    """Return the scattering angles in increasing order of the impact parameter."""
     runs = groups[0].runs
     rows = sorted(map(scattering, runs), key=lambda row: row["b_over_R12"])
     warnings = [
