@@ -73,85 +73,92 @@ NOTES = """
 Some references are approximate, differ from a publication, or hold only under certain conditions.
 A number in parentheses is the standard error of the last digit.
 
-- **P6-03, relaxation of a mixture.** A published ratio of energies, 1.39(1) after 2 collisions per
-  disk, is too low. Other values of this ratio:
+**P6-03, relaxation of a mixture.** A published ratio of energies, 1.39(1) after 2 collisions per
+disk, is too low. Other values of this ratio:
 
-  | method | ratio |
-  |---|---|
-  | measured here | 1.468(6) |
-  | measured here, time steps | 1.485(11) |
-  | measured here, dilute gas | 1.449(8) |
-  | Boltzmann equation | 1.455 |
+| method | ratio |
+|---|---|
+| measured here | 1.468(6) |
+| measured here, time steps | 1.485(11) |
+| measured here, dilute gas | 1.449(8) |
+| Boltzmann equation | 1.455 |
 
-- **P7-07, collision rates of a mixture.** The reference is calculated with approximate contact
-  values of the pair distribution functions. For packing 0.1 the table lists the error of these
-  values, to first order in the density, and the measured deviation from the reference.
+**P7-07, collision rates of a mixture.** The reference is calculated with approximate contact values
+of the pair distribution functions. For packing 0.1 the table lists the error of these values, to
+first order in the density, and the measured deviation from the reference.
 
-  | pair | error of the contact value (%) | measured deviation (%) |
-  |---|---|---|
-  | 11 | +0.26 | +0.11(5) |
-  | 12 | +0.16 | +0.14(7) |
-  | 22 | -0.29 | -0.45(6) |
+| pair | error of the contact value (%) | measured deviation (%) |
+|---|---|---|
+| 11 | +0.26 | +0.11(5) |
+| 12 | +0.16 | +0.14(7) |
+| 22 | -0.29 | -0.45(6) |
 
-- **P8-03, pressure of a dense fluid.** There is no case P8-03 in the table. Up to packing 0.70 the
-  measured pressure agrees with Li et al. (2022) within its errors of 0.03 to 0.2 %.
-- **P8-05, pressure of the crystal.** The formula of the reference is accurate to 0.2 %.
-- **P9-07, TC model.** The theoretical fractions of elastic collisions are accurate to 0.01 up to
-  packing 0.1. In denser gases the same disks collide repeatedly. With the collision rate w of a
-  disk and the contact duration t_c, the fractions are:
+**P8-03, pressure of a dense fluid.** There is no case P8-03 in the table. Up to packing 0.70 the
+measured pressure agrees with Li et al. (2022) within its errors of 0.03 to 0.2 %.
 
-  | w t_c | low packing | packing 0.2 |
-  |---|---|---|
-  | 1 | 0.86 | 0.850 |
-  | 0.5 | 0.62 | 0.612 |
+**P8-05, pressure of the crystal.** The formula of the reference is accurate to 0.2 %.
 
-- **P10-04, craters without the TC model.** Without the TC model a collapse occurs in all 12 runs
-  before the energy has fallen to a tenth. In 7 of them time no longer advances, and the run ends.
-- **P11-01, energy under gravity.** In the published table the centres of the disks start between R
-  and 8. In this program a disk lies completely inside its starting region, so that the region ends
-  at 8 + R.
-- **P11-10, time steps.** Time steps miss the fraction P(q) of the collisions, with q = g Δt / s,
-  the relative speed g, the time step Δt and the sum s of the radii. The argument is q and not
-  q / 2, because a collision is detected only while the disks approach each other, which they do
-  along the first half of the path on which they overlap.
-- **P12-06, diffusion in a Lorentz gas.** The density expansion of D_0/D has the coefficients -4/3,
-  -0.8775 and 4.519. They are quoted from memory: the papers of van Leeuwen and Weijland could not
-  be consulted, and no published simulation was found. Two references are exact: the limit of low
-  density, D_0 = 3v/(16nR) from the Boltzmann equation, and the mean free time of P12-05. The table
-  compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs of
-  10^6 events for each density). The first two terms agree with the measured values within their
-  errors up to n R^2 = 0.005. At n R^2 = 0.01 and above, the omitted terms are larger than the
-  errors.
+**P9-07, TC model.** The theoretical fractions of elastic collisions are accurate to 0.01 up to
+packing 0.1. In denser gases the same disks collide repeatedly. With the collision rate w of a disk
+and the contact duration t_c, the fractions are:
 
-  | n R^2 | 0.0025 | 0.005 | 0.01 | 0.02 | 0.04 | 0.08 |
-  |---|---|---|---|---|---|---|
-  | measured D/D_0 | 0.984(2) | 0.968(3) | 0.947(2) | 0.909(3) | 0.842(1) | 0.719(3) |
-  | expansion | 0.982 | 0.967 | 0.941 | 0.897 | 0.825 | 0.723 |
-  | expansion without its last term | 0.983 | 0.970 | 0.950 | 0.920 | 0.880 | 0.834 |
+| w t_c | low packing | packing 0.2 |
+|---|---|---|
+| 1 | 0.86 | 0.850 |
+| 0.5 | 0.62 | 0.612 |
 
-- **P12-09, Lyapunov exponent of the stadium.** The value 0.43 is quoted from memory, because the
-  papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. The estimator
-  itself is confirmed by case P12-08, in which the exponent of an unstable path is known exactly. An
-  independent program for points (4000 paths of 2000 collisions) found 0.4292(5).
-- **P15-09, sheared inelastic gas.** The theory is linear in the stress, and its error grows with
-  the inelasticity. The table lists the reduced shear rate, -P_xy and P_yy.
+**P10-04, craters without the TC model.** Without the TC model a collapse occurs in all 12 runs
+before the energy has fallen to a tenth. In 7 of them time no longer advances, and the run ends.
 
-  | restitution ξ | theory | measured |
-  |---|---|---|
-  | 0.95 | 0.2276, 0.2142, 0.9518 | 0.2275(6), 0.2168(6), 0.9494(6) |
-  | 0.8 | 0.475, 0.379, 0.826 | 0.490(1), 0.386(1), 0.818(1) |
+**P11-01, energy under gravity.** In the published table the centres of the disks start between R
+and 8. In this program a disk lies completely inside its starting region, so that the region ends at
+8 + R.
 
-- **P15-13, Maxwell's demon.** The theoretical threshold, a floor velocity of 0.73, is derived for
-  many dilute grains. The 120 disks of this case distribute evenly between the chambers above a
-  velocity of about 0.65. With 600 disks of a fifth of the diameter, most disks are still in one
-  chamber at 0.65.
-- **P15-20, effusion.** The theoretical rate applies to an opening much narrower than the mean free
-  path and than the chamber. The measured rate is 1.9(6) % higher if the opening is as wide as 0.05
-  of the chamber, and 5.4(6) % higher if it is also 0.2 mean free paths wide.
-- **P15-21, discharge of a hopper.** The tolerance covers the values of the literature, k between 1
-  and 2. Since k and the exponent are strongly correlated, each was fitted with the other one fixed.
-  Smooth grains do not obey Beverloo's law: for 2000 smooth grains the fitted exponent is 1.29(3),
-  with k = 1.3(2).
+**P11-10, time steps.** Time steps miss the fraction P(q) of the collisions, with q = g Δt / s, the
+relative speed g, the time step Δt and the sum s of the radii. The argument is q and not q / 2,
+because a collision is detected only while the disks approach each other, which they do along the
+first half of the path on which they overlap.
+
+**P12-06, diffusion in a Lorentz gas.** The density expansion of D_0/D has the coefficients -4/3,
+-0.8775 and 4.519. They are quoted from memory: the papers of van Leeuwen and Weijland could not be
+consulted, and no published simulation was found. Two references are exact: the limit of low
+density, D_0 = 3v/(16nR) from the Boltzmann equation, and the mean free time of P12-05. The table
+compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs of 10^6
+events for each density). The first two terms agree with the measured values within their errors up
+to n R^2 = 0.005. At n R^2 = 0.01 and above, the omitted terms are larger than the errors.
+
+| n R^2 | 0.0025 | 0.005 | 0.01 | 0.02 | 0.04 | 0.08 |
+|---|---|---|---|---|---|---|
+| measured D/D_0 | 0.984(2) | 0.968(3) | 0.947(2) | 0.909(3) | 0.842(1) | 0.719(3) |
+| expansion | 0.982 | 0.967 | 0.941 | 0.897 | 0.825 | 0.723 |
+| expansion without its last term | 0.983 | 0.970 | 0.950 | 0.920 | 0.880 | 0.834 |
+
+**P12-09, Lyapunov exponent of the stadium.** The value 0.43 is quoted from memory, because the
+papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. The estimator
+itself is confirmed by case P12-08, in which the exponent of an unstable path is known exactly. An
+independent program for points (4000 paths of 2000 collisions) found 0.4292(5).
+
+**P15-09, sheared inelastic gas.** The theory is linear in the stress, and its error grows with the
+inelasticity. The table lists the reduced shear rate, -P_xy and P_yy.
+
+| restitution ξ | theory | measured |
+|---|---|---|
+| 0.95 | 0.2276, 0.2142, 0.9518 | 0.2275(6), 0.2168(6), 0.9494(6) |
+| 0.8 | 0.475, 0.379, 0.826 | 0.490(1), 0.386(1), 0.818(1) |
+
+**P15-13, Maxwell's demon.** The theoretical threshold, a floor velocity of 0.73, is derived for
+many dilute grains. The 120 disks of this case distribute evenly between the chambers above a
+velocity of about 0.65. With 600 disks of a fifth of the diameter, most disks are still in one
+chamber at 0.65.
+
+**P15-20, effusion.** The theoretical rate applies to an opening much narrower than the mean free
+path and than the chamber. The measured rate is 1.9(6) % higher if the opening is as wide as 0.05 of
+the chamber, and 5.4(6) % higher if it is also 0.2 mean free paths wide.
+
+**P15-21, discharge of a hopper.** The tolerance covers the values of the literature, k between 1
+and 2. Since k and the exponent are strongly correlated, each was fitted with the other one fixed.
+Smooth grains do not obey Beverloo's law: for 2000 smooth grains the fitted exponent is 1.29(3),
+with k = 1.3(2).
 """
 
 
@@ -261,10 +268,10 @@ The columns are those of the first table, with the number of compared *values*.
 BARS = """
 ## Error bars and p-values
 
-Of 100 correct error bars, 68 contain the true value. The tables of this section, written by
-`python tests/coverage_tables.py`, show how many bars of the scripts do so. The systems and
-quantities were chosen before the first run, and the seeds of the tables were not used to improve
-the estimators. Some rows were measured again:
+Of 100 correct error bars, 68 contain the true value. How many of the error bars of the scripts
+contain it? The tables of this section, written by `python tests/coverage_tables.py`, give the
+answer. The systems and quantities were chosen before the first run, and the seeds of the tables
+were not used to improve the estimators. Some rows were measured again:
 
 - The first tables showed that four errors were wrong: those of the flow velocity, of the slopes
   under gravity, of the coefficients from Helfand moments and of the thermalisation time. Their rows
@@ -287,9 +294,9 @@ are:
 Four rows of the craters are outside the limits. A projectile as light as a disk hits or displaces
 few disks in most beds and many in some: the distribution of these numbers is skewed (skewness 2.2).
 Four values of such a distribution often include no large value; then both their mean and their
-error are too small. In random choices from 240 craters, the coverage is 64 % for 16 values and 67 %
-for 64 values. The exponents follow from these numbers, and their errors are too small for the same
-reason.
+error are too small. For means over more values, drawn at random from 240 craters, the coverage is
+better: 64 % for 16 values, and 67 % for 64 values. The exponents follow from these numbers, and
+their errors are too small for the same reason.
 
 | system | quantity | bars | coverage | error / scatter | three |
 |---|---|---|---|---|---|
