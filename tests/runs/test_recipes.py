@@ -109,6 +109,23 @@ def look_at_pulses(program, folder):
     assert abs(v).tolist() == [1, 2]
 
 
+def look_at_restitution(program, folder):
+    """Check a head-on collision at half the reference speed, in the program and in Python."""
+    (folder / "linear.nml").write_text(
+        """&species radius = 0.1 position = 0.2, 0.5, 0.8, 0.5 velocity = 0.5, 0, -0.5, 0 /
+        &contact restitution = 0.6 restitution_law = 'linear' reference_speed = 2 /
+        &stop time = 0.6 /"""
+    )
+    ran(program, "linear.nml", "-o", "linear.h5", "--quiet", cwd=folder, check=True)
+    code = "from ricochet import read_run; print(read_run('linear.h5').contact_law.at(1.0))"
+    own = environment(PYTHONPATH=folder / "post")
+    said = ran(sys.executable, "-c", code, cwd=folder, env=own, check=True).stdout
+    assert float(said) == pytest.approx(0.8)
+    with h5py.File(folder / "linear.h5") as file:
+        v = file["particles/disks/velocity/value"][-1, :, 0]
+    assert v.tolist() == pytest.approx([-0.4, 0.4])
+
+
 @pytest.fixture
 def by_recipe(tmp_path):
     """Return a copy of the sources in which all recipes have been applied."""
@@ -178,6 +195,7 @@ def test_the_recipes_work(tmp_path, by_recipe):
         energy = file["observables/all/kinetic_energy/value"][-1]
     assert energy == pytest.approx(2 * (1 - np.exp(-1)), rel=4 / np.sqrt(3000))
     look_at_pulses(run[0], tmp_path)
+    look_at_restitution(run[0], tmp_path)
     for other in ("cores", "parts"):
         found = differences(tmp_path / "plain.h5", tmp_path / f"{other}.h5")
         assert [name for name in found if "parameters" not in name] == []
