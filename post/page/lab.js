@@ -404,7 +404,7 @@ function arrangeAll() {
   const boxes = shownBoxes(), many = isComparing(), { clientWidth, clientHeight } = $('runs');
   const upright = clientWidth < 560, count = many ? boxes.length : 1, edge = parseFloat(getComputedStyle($('runs')).paddingLeft);
   const width = Math.floor((clientWidth - 2 * edge - scrollBar) / count);
-  const shapes = films().map(one => one.inside().film?.edges).filter(Boolean).map(([x, y]) => y / x), highest = clientHeight * (upright ? 0.36 : 0.42) - 26;
+  const shapes = films().map(one => one.inside().film?.edges).filter(Boolean).map(([x, y]) => y / x), highest = clientHeight * (upright ? 0.36 : 0.56) - 26;
   const size = { width: width - 12, height: Math.floor(Math.min(highest, (width - 12) * Math.max(0.5, ...shapes))) }, lead = leader();
   $('runs').classList.toggle('many', many);
   $('runs').style.gridTemplateColumns = many ? `repeat(${count}, ${width}px) 1fr` : 'minmax(0, 1fr)';
@@ -415,6 +415,7 @@ function arrangeAll() {
     box.figure.style.height = bare ? `${size.height + 50}px` : '';
     box.figure.classList.toggle('lead', !bare);
     box.figure.classList.toggle('waiting', bare && box === current());
+    box.figure.firstChild.style.setProperty('--run', many && isThere(box) && filmOf(box).inside().kinds?.length === 1 ? filmOf(box).runColour(box.letter) : 'transparent');
     box.figure.firstChild.style.width = many ? `${size.width}px` : '';
     box.figure.firstChild.style.marginLeft = `${left}px`;
     if (isThere(box)) filmOf(box).arrange(many ? { ...size, left } : null, bare);

@@ -223,7 +223,7 @@ function drawHistogram() {
   pen.clip();
   for (const s of counted) {
     const one = 1 / (seen[s] * width);
-    pen.fillStyle = css(speciesColour(kinds[s]));
+    pen.fillStyle = curveColour(s);
     pen.globalAlpha = 0.45;
     pen.beginPath();
     counts[s].forEach((n, bin) => n && pen.rect(x(bin * width), y(n * one), x(width) - x(0) - 0.5, plot.bottom - y(n * one)));
@@ -242,7 +242,7 @@ const narrowness = ({ kinds: own, energies }, s) => own[s].mass / (energies[s] |
 function drawMaxwell(pen, one, s, x, y, top) {
   const b = narrowness(one, s);
   if (!(b > 0)) return;
-  Object.assign(pen, { lineWidth: one.letter ? 1.2 : 2, strokeStyle: css(speciesColour(kinds[s % kinds.length])) });
+  Object.assign(pen, { lineWidth: one.letter ? 1.2 : 2, strokeStyle: curveColour(s, one.letter) });
   pen.setLineDash(DASHES[s % DASHES.length]);
   pen.beginPath();
   for (let k = 0; k <= 120; k++) {
@@ -268,7 +268,7 @@ function speedsOfFilm() {
 function drawOutline(pen, one, x, height, from) {
   one.kinds.forEach((kind, s) => {
     let best = [0, Infinity];
-    Object.assign(pen, { lineWidth: 1.2, strokeStyle: css(speciesColour(kinds[s % kinds.length])), fillStyle: ink.ink });
+    Object.assign(pen, { lineWidth: 1.2, strokeStyle: curveColour(s, one.letter), fillStyle: ink.ink });
     pen.setLineDash([]);
     pen.beginPath();
     one.counts[s].slice(from, from + one.edges.length - 1).forEach((n, bin) => {
@@ -289,7 +289,7 @@ function drawSpeedsAndRest(plot, counts, seen, others) {
   const { x, y } = axes(plot, [edges[0], edges.at(-1)], [-0.3, most], 'speed', value => Number.isInteger(value) ? power(value) : '');
   pen.globalAlpha = 0.6;
   for (const s of counted) {
-    pen.fillStyle = css(speciesColour(kinds[s]));
+    pen.fillStyle = curveColour(s);
     counts[s].slice(1, edges.length).forEach((n, bin) => n && pen.fillRect(x(edges[bin]), y(Math.log10(n)), x(edges[bin + 1]) - x(edges[bin]) - 0.5, plot.bottom - y(Math.log10(n))));
   }
   pen.globalAlpha = 1;
@@ -304,6 +304,13 @@ const ENERGIES = { kinetic: [], potential: [5, 3], rotational: [1.5, 2.5] }, DAS
 let cursorAt;      // conversion of times to pixels
 let overlaid = [];  // compared runs in the same plots: letter, curves, kinds, and functions for present speeds and numbers
 
+// Curves of compared runs have the colours of the runs, unless several species need colours.
+// Without a letter, the colour is that of the present run.
+const RUN_COLOURS = ['#0072b2', '#d55e00', '#009e73', '#b5649a'];
+function runColour(letter) { return RUN_COLOURS[(letter.charCodeAt(0) - 65) % RUN_COLOURS.length]; }
+const hasRunColours = () => overlaid.length > 0 && kinds.length === 1;
+const curveColour = (s, letter = parent.letterOf?.(window)) => hasRunColours() && letter ? runColour(letter) : css(speciesColour(kinds[s % kinds.length]));
+
 const share = s => state.total ? moment.inside[s] : 1;
 const there = () => Object.keys(ENERGIES).filter(kind => source.curves()[kind]);
 const lastOf = (name, s) => {
@@ -315,7 +322,7 @@ function drawEnergies() {
   const lines = [], add = (curves, own, letter) => {
     for (const [name, dash] of Object.entries(ENERGIES)) curves[name]?.forEach((values, s) => lines.push({
       time: curves.time, values: state.total ? values.map((e, k) => e === null ? e : e * (curves.inside?.[s][k] ?? own[s].count)) : values,
-      colour: css(speciesColour(kinds[s % kinds.length])), dash, letter,
+      colour: curveColour(s, letter), dash, letter,
     }));
   };
   for (const { letter, curves, kinds: own } of overlaid) add(curves, own, letter);
@@ -324,10 +331,10 @@ function drawEnergies() {
 }
 
 function drawPressure() {
-  const { time, pressure: measured } = source.curves(), colour = ink.accent;
+  const { time, pressure: measured } = source.curves(), colourOf = letter => hasRunColours() ? curveColour(0, letter) : ink.accent;
   const falls = film.gravity.some(Boolean), pressure = falls ? null : measured;  // depends on the height under gravity
-  const lines = overlaid.filter(({ curves }) => curves.pressure && !falls).map(({ letter, curves }) => ({ time: curves.time, values: curves.pressure, colour, letter }));
-  if (pressure?.some(one => one !== null)) lines.push({ time, values: pressure, colour });
+  const lines = overlaid.filter(({ curves }) => curves.pressure && !falls).map(({ letter, curves }) => ({ time: curves.time, values: curves.pressure, colour: colourOf(letter), letter }));
+  if (pressure?.some(one => one !== null)) lines.push({ time, values: pressure, colour: colourOf() });
   $('pressures').hidden = !lines.length;
   if (lines.length) plotLines($('pressure'), lines, overlaid.length ? Infinity : moment.time);
   const now = pressure && lastOf('pressure');
@@ -339,7 +346,7 @@ function drawInside() {
   $('population').hidden = !film.isOpen;
   if (!film.isOpen) return;
   const ofRun = ({ time, inside, left, entered }, letter) => [
-    ...inside.map((values, s) => ({ time, values, letter, colour: css(speciesColour(kinds[s % kinds.length])) })),
+    ...inside.map((values, s) => ({ time, values, letter, colour: curveColour(s, letter) })),
     ...[[left, ENERGIES.potential], [entered, ENERGIES.rotational]].filter(([values]) => values?.some(Boolean)).map(([values, dash]) => ({ time, values, letter, dash, colour: ink.soft })),
   ];
   const others = overlaid.filter(({ curves }) => curves.inside).flatMap(({ letter, curves }) => ofRun(curves, letter));
@@ -371,7 +378,8 @@ const rounded = (value, power) => Math.abs(power) > 7 ? short(value)
   : (Math.round(value / 10 ** power) * 10 ** power).toFixed(Math.max(0, -power)).replace('-', '−');
 const secondDigit = error => Math.floor(Math.log10(error.toPrecision(2))) - 1;
 
-// Returns a mean and its error, rounded to two digits of the error, or a question mark if the run is too short for an error. A line can break before the sign ±, but not after it.
+// Returns a mean and its error, rounded to two digits of the error, or a question mark if the run is
+// too short for an error. A line can break before the sign ±, but not after it.
 function withError({ value, error, short: isShort }) {
   if (value === null) return isShort ? 'too short' : '';
   if (!error) return isShort ? `${short(value)} ±\u00a0?` : short(value);

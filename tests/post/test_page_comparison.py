@@ -21,6 +21,11 @@ def test_kept_runs_stand_beside_the_next_in_equal_boxes_and_plots(opened):
     below = opened.run(f"return Math.max(...{seen}.map(one => one.getBoundingClientRect().bottom))")
     assert below < opened.run("return $('runs').clientHeight")
     assert opened.run("return state.boxes.map(box => box.letter)") == ["A", "B"]
+    assert (
+        opened.run("return filmOf(current()).document.getElementById('stage').offsetHeight") > 340
+    )
+    tags = "return state.boxes.map(box => box.figure.firstChild.style.getPropertyValue('--run'))"
+    wait_for(lambda: len({*opened.run(tags)} - {"transparent"}) == 2)
     wait_for(lambda: len(inside(opened, "overlaid")) == 1)
     opened.press("p")
     opened.until("return films().every(one => !one.inside().state.playing)")
