@@ -290,7 +290,7 @@ function changed(key) {
 function hear(source, news) {
   const box = state.boxes.find(one => one.frame.contentWindow === source);
   if (!box) return;
-  if (news.is === 'scene' && box === current()) buildDoors(news.facts);
+  if (news.is === 'scene' && box === current()) buildOpenSystem(news.facts);
   if (news.is === 'scene' && !news.changed) {
     Object.assign(box, { run: news.run, words: box.wished.words, changes: [] });
     Object.assign(state, { has: { ...box.wished.settings }, started: true });

@@ -1,4 +1,4 @@
-"""Open systems in the player and the laboratory: disks that leave and enter, and their doors."""
+"""Open systems in the player and the laboratory: disks that leave and enter, and their buttons."""
 
 import asyncio
 import base64
@@ -21,7 +21,7 @@ OPEN = """
 &species name = 'gas' count = 40 waiting = 20 radius = 0.02 temperature = 4 /
 &source name = 'pump' region = 0, 0.5, 0, 1 interval = 0.1 count = 5 temperature = 4
   end_time = 0.35 /
-&change name = 'lid' time = 0.6 set = 'side.right.open=.true.' /
+&change name = 'opened' time = 0.6 set = 'side.right.open=.true.' /
 &stop time = 2 /
 &output frames_every_time = 0.1 observables_every_time = 0.1 event_log = .true. /
 """
@@ -126,31 +126,31 @@ def test_disks_outside_cannot_be_pushed_and_each_frame_says_who_is_inside(addres
             for wish in ({"do": "push"}, {"do": "place", "position": [5, 5]}):
                 await one.say(**wish, disk=200)
                 assert "disk 201 is outside" in (await one.until("state", "scene"))["reason"]
-            await one.say("lid", side=1, open=True)
+            await one.say("open_side", side=1, open=True)
             assert (await one.until("scene"))["facts"]["sides"][1]["open"]
             assert np.frombuffer(await one.until("frame"), float, HEAD)[6] == 2
-            await one.say("pump", source="pump", count=70)
+            await one.say("insert", source="pump", count=70)
             await one.until("scene")
             assert (await one.until("numbers"))["inside"] == [120]
 
     asyncio.run(visit())
 
 
-DOORS = "return [...$('doors').children].map(one => one.textContent)"
+BUTTONS = "return [...$('open_system').children].map(one => one.textContent)"
 
 
 def test_the_buttons_of_a_pump_add_disks_and_open_and_close_its_lid(opened):
     """The script repeats this, and nothing is cut in any window."""
-    assert opened.run(DOORS) == []
+    assert opened.run(BUTTONS) == []
     before = opened.run("return current().run")
     opened.run("choose('pump')")
     moving(opened, before)
-    assert opened.run(DOORS) == ["add 50 disks", "open the right side"]
-    opened.run("for (const one of $('doors').children) one.click()")
-    wait_for(lambda: opened.run(DOORS)[1] == "close the right side")
+    assert opened.run(BUTTONS) == ["add 50 disks", "open the right side"]
+    opened.run("for (const one of $('open_system').children) one.click()")
+    wait_for(lambda: opened.run(BUTTONS)[1] == "close the right side")
     wait_for(lambda: inside(opened, "stream.curves.left.at(-1)") > 0)
-    opened.run("$('doors').lastChild.click()")
-    wait_for(lambda: opened.run(DOORS)[1] == "open the right side")
+    opened.run("$('open_system').lastChild.click()")
+    wait_for(lambda: opened.run(BUTTONS)[1] == "open the right side")
     assert opened.run("return current().changes.map(one => one[2])") == [
         "up to 50 disks are let in",
         "the right side is opened",

@@ -15,7 +15,7 @@ PAGE = SCRIPTS / "page"  # folder of the parts
 INPUTS = SCRIPTS.parent / "input"
 MODULES = ("film", "camera", "stage", "panels", "sliders", "controls")
 MODULES += ("encounter", "stream", "live")
-LAB_MODULES = ("sliders", "values", "lab", "disks", "doors")
+LAB_MODULES = ("sliders", "values", "lab", "disks", "open_system")
 
 
 def page(run: Run, film: dict | None) -> str:

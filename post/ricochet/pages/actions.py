@@ -14,10 +14,10 @@ def words(what: str, value: object) -> str:
         return f"all speeds times {value:g}"
     if what == "hold":
         return f"the {next(iter(value)).split('.')[1]} side is dragged"
-    if what == "lid":
+    if what == "open_side":
         ((name, opens),) = value.items()
         return f"the {name.split('.')[1]} side is {'opened' if opens == '.true.' else 'closed'}"
-    if what == "pump":
+    if what == "insert":
         return f"up to {next(iter(value[0].values()))} disks are let in"
     return f"disk {value[0] + 1} {DONE_TO_DISK[what]}"
 
@@ -61,7 +61,7 @@ def script(name: str, text: str, actions: list[tuple], end: float) -> str:
             lines.append(f"    values = simulation.{name}.copy()")
             lines.append(f"    values[{value[0]}] = {value[1]!r}")
             lines.append(f"    simulation.{name} = values")
-        elif what == "pump":
+        elif what == "insert":
             burst, then, usual = value
             call = f".change({burst!r}).advance(time={then!r}).change({usual!r})"
             lines.append(f"    simulation{call}")

@@ -199,16 +199,16 @@ class Session:
         wish |= {"start_time": repr(now), "end_time": repr(now + taken)}
         self.apply("hold", rest | {name + word: value for word, value in wish.items()})
 
-    def lid(self, request: dict) -> None:
+    def open_side(self, request: dict) -> None:
         """Open a side, or close it as soon as no disk overlaps it."""
         side, is_open = SIDES[int(request["side"])], bool(request["open"])
         wish = {f"side.{side}.open": value_text("", is_open)}
         self.closing = None
-        if not self.apply("lid", wish, refused=is_open) and not is_open:
+        if not self.apply("open_side", wish, refused=is_open) and not is_open:
             self.closing = wish
             self.send_state(f"the {side} side is closed as soon as no disk overlaps its line")
 
-    def pump(self, request: dict) -> None:
+    def insert(self, request: dict) -> None:
         """Let waiting disks enter through a source at once, at most the requested number."""
         now, known = self.simulation._settle(), self.simulation._values()
         then = now + AT_ONCE * (now + self.pace or 1.0)
@@ -217,7 +217,7 @@ class Session:
         burst[f"source.{request['source']}.end_time"] = then
         usual, before = {name: known.get(name) for name in burst}, self.simulation.present.sum()
         done = partial(let_in, self.simulation, burst, then, usual)
-        is_done = self.apply("pump", (burst, then, usual), done)
+        is_done = self.apply("insert", (burst, then, usual), done)
         if is_done and self.simulation.present.sum() <= before:
             self.send_state("no disk waits outside, or there is no free place for it")
 
@@ -344,7 +344,7 @@ class Session:
         except ProgramError as problem:
             self.ended, self.reason = True, str(problem)
         self.goal = None
-        if self.closing and self.apply("lid", self.closing, refused=False):
+        if self.closing and self.apply("open_side", self.closing, refused=False):
             self.closing = None
         if len(self.simulation.changes) != self.made:  # a change scheduled in the input
             self.send_scene(changed=True)
@@ -400,7 +400,7 @@ class Session:
             for name, value in (values.items() if what == "change" else [("", words(what, values))])
         ]
         times = {when for when, *_ in self.actions}
-        times |= {value[1] for _, what, value, _ in self.actions if what == "pump"}
+        times |= {value[1] for _, what, value, _ in self.actions if what == "insert"}
         planned = [one for one in self.simulation.changes if one[0] not in times]
         changes = sorted(changes + planned, key=lambda one: one[0])
         # While the user drags a side, this change is described only once.
@@ -563,8 +563,8 @@ def work(describe_scene: Callable[[Run], tuple[dict, dict]]) -> None:
         "reach",
         "event",
         "keep",
-        "lid",
-        "pump",
+        "open_side",
+        "insert",
     )
     handlers |= {name: getattr(session, name) for name in own}
     while True:

@@ -179,8 +179,10 @@ def opens(parameters: Mapping[str, Any]) -> bool:
     """Return whether disks can leave or enter the box, or could do so before a change."""
     species = parameters.get("species", {})
     waiting = any(one.get("waiting", 0) for one in species.values() if isinstance(one, Mapping))
-    lids = any(one.get("open") for one in parameters.get("side", {}).values())
-    return bool("source" in parameters or waiting or lids or ".open=" in changes_in(parameters))
+    open_sides = any(one.get("open") for one in parameters.get("side", {}).values())
+    return bool(
+        "source" in parameters or waiting or open_sides or ".open=" in changes_in(parameters)
+    )
 
 
 def changes_in(parameters: Mapping[str, Any]) -> str:
