@@ -119,7 +119,7 @@ contains
     session => session_of(handle)
     rule = goal_of(session, time, collisions, events)
     call advance_to(session, rule, patience, code, error)
-    if (code == 0) call report_rest(session%evolution, session%sim, rule%limits, error)
+    if (code == 0) call report_rest(session%sim, rule%limits, error)
     if (allocated(error) .or. code /= going_on) code = answer(error, message, room)
   end function advance
 

@@ -262,7 +262,7 @@ contains
       end if
       call run%line%report(run%sim, run%stop_rule)
     end do
-    call report_rest(run%evolution, run%sim, run%stop_rule%limits, error)
+    call report_rest(run%sim, run%stop_rule%limits, error)
     call run%line%clear()
   end subroutine main_loop
 

@@ -2,9 +2,10 @@
 !> for an inelastic collapse. The time and the result of the test depend only on the state of the
 !> simulation, and not on the search, the queue or the number of threads.
 module epochs
-  use box_sides, only: separate_from_sides
+  use box_sides, only: bounds, next_side, separate_from_sides
+  use encounters, only: is_passage
   use kinds, only: int32, int64, never, pi, real64
-  use partners, only: axis_of, is_side, sense_of
+  use partners, only: axis_of, n_sides, sense_of
   use renumbering, only: renumber
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
@@ -12,7 +13,7 @@ module epochs
   private
   public :: are_crushed, restart_epoch, begin_first_epoch, ends_by_event, ends_by_kick, is_at_rest, last_time, most_events
   public :: stays_at_rest
-  public :: disk_on_side, has_come_to_rest, move_epoch, stands_still
+  public :: disk_on_side, has_come_to_rest, last_encounter, move_epoch, stands_still
 
   !> Intended number of collisions per disk in an epoch. Moving the time origin at the end of each
   !> epoch preserves the precision of times.
@@ -311,42 +312,85 @@ contains
     if (yes) yes = is_at_rest(sim)
   end function stays_at_rest
 
-  !> The disk of lowest id that rests on a side while other disks move; 0 if there is none. The last
-  !> event of the disk and its next bounce on a dissipative side are both within `negligible_time`
-  !> of the present time. The bounces of this disk are lower than the spacing of its coordinates;
-  !> the bounces therefore converge, and time stops advancing.
+  !> The disk of lowest id that rests on a side while other disks move, and this side; 0 if there
+  !> is none. Its last event and its next bounce on a dissipative side are both within
+  !> `negligible_time` of the present time. Its bounces are lower than the spacing of its
+  !> coordinates; they therefore converge, and time stops advancing. The next bounce is computed
+  !> here, because the event that a disk stores depends on the search, and the parallel engine may
+  !> not have predicted any.
   pure function disk_on_side(sim) result(found)
     type(simulation_t), intent(in) :: sim
-    integer(int32) :: found, i
+    integer(int32) :: found(2)                       !! index of the disk, and code of the side
+    integer(int32) :: i, side
+    real(real64) :: t                                ! time relative to the time origin `box%epoch` [time]
 
     found = 0
     if (sim%law%contact_time > 0) return             ! bounces then become elastic and do not converge
     do i = 1, sim%n_disks()
-      if (.not. rests(i)) cycle
-      if (found > 0) then
-        if (sim%tag(found)%id < sim%tag(i)%id) cycle
+      if (sim%now - sim%disk(i)%clock > sim%negligible_time .or. .not. sim%is_inside(i)) cycle
+      if (found(1) > 0) then
+        if (sim%tag(found(1))%id < sim%tag(i)%id) cycle
       end if
-      found = i
+      call next_side(sim%box, sim%disk(i), t, side)
+      if (t - sim%now > sim%negligible_time) cycle
+      if (bounces_converge(sim, i, side)) found = [i, side]
     end do
-  contains
-
-    !> True if disk i rests on a side, at least for the moment.
-    pure function rests(i) result(yes)
-      integer(int32), intent(in) :: i
-      logical :: yes
-
-      associate (disk => sim%disk(i), last => sim%negligible_time)
-        yes = sim%now - disk%clock <= last .and. disk%event_time - sim%now <= last .and. disk%partner <= 0
-        if (yes) yes = is_side(disk%partner)
-        if (.not. yes) return
-        associate (axis => axis_of(disk%partner), k => 1 - disk%partner)
-          associate (law => sim%box%surface(k)%law)
-            yes = sim%box%is_wall(k) .and. law%restitution < 1 .and. .not. law%temperature > 0 &
-              .and. abs(-sense_of(disk%partner)*disk%v(axis) - sim%box%side_velocity(k, sim%now)) <= last*magnitude(sim%box%gravity)
-          end associate
-        end associate
-      end associate
-    end function rests
   end function disk_on_side
+
+  !> True if a side is dissipative, and disk i moves so slowly relative to it that its bounces are
+  !> not resolved.
+  pure function bounces_converge(sim, i, side) result(yes)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: side               !! code of the side
+    logical :: yes
+    integer(int32) :: k
+
+    k = 1 - side
+    associate (law => sim%box%surface(k)%law, inwards => -sense_of(side)*sim%disk(i)%v(axis_of(side)))
+      yes = .not. is_passage(sim, side) .and. law%restitution < 1 .and. .not. law%temperature > 0 &
+        .and. abs(inwards - sim%box%side_velocity(k, sim%now)) <= sim%negligible_time*magnitude(sim%box%gravity)
+    end associate
+  end function bounces_converge
+
+  !> The last event of disks at rest, as far as the state determines it: the disk with the latest
+  !> clock (of several disks, that with the lowest id) and its last collision partner or, if this is
+  !> a side, the nearest side; 0 if there was no event.
+  pure function last_encounter(sim) result(pair)
+    type(simulation_t), intent(in) :: sim
+    integer(int32) :: pair(2)                        !! index of the disk, and its partner: see `partners`
+    integer(int32) :: i
+
+    pair = 0
+    if (sim%tally%events == 0) return
+    do i = 1, sim%n_disks()
+      if (.not. sim%is_inside(i)) cycle
+      if (pair(1) > 0) then
+        associate (disk => sim%disk(i), latest => sim%disk(pair(1)))
+          if (disk%clock < latest%clock) cycle
+          if (.not. disk%clock > latest%clock .and. sim%tag(i)%id > sim%tag(pair(1))%id) cycle
+        end associate
+      end if
+      pair(1) = i
+    end do
+    if (pair(1) == 0) return
+    pair(2) = sim%tag(pair(1))%last_partner
+    if (pair(2) > 0) pair(2) = findloc(sim%tag%id, pair(2), dim=1, kind=int32)
+    if (pair(2) == 0) pair(2) = nearest_side(sim, pair(1))
+  end function last_encounter
+
+  !> Code of the side nearest to disk i at its clock, among those from which disks rebound.
+  pure function nearest_side(sim, i) result(side)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    integer(int32) :: side, k
+    real(real64) :: lower(2), upper(2), gap(n_sides) ! [length]
+
+    call bounds(sim%box, sim%disk(i)%clock, lower, upper)
+    gap([1, 3]) = sim%disk(i)%x - lower
+    gap([2, 4]) = upper - sim%disk(i)%x
+    where ([(is_passage(sim, 1 - k), k=1, n_sides)]) gap = never
+    side = 1 - minloc(gap, dim=1, kind=int32)
+  end function nearest_side
 
 end module epochs

@@ -7,8 +7,8 @@ module timeline
   use box_geometry, only: wall_normal
   use changes, only: make_scheduled_change
   use entries, only: entry_time, let_disks_enter
-  use epochs, only: are_crushed, disk_on_side, ends_by_event, ends_by_kick, has_come_to_rest, is_at_rest, last_time, most_events
-  use epochs, only: move_epoch, stands_still
+  use epochs, only: are_crushed, disk_on_side, ends_by_event, ends_by_kick, has_come_to_rest, is_at_rest, last_encounter
+  use epochs, only: last_time, most_events, move_epoch, stands_still
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
@@ -135,7 +135,7 @@ contains
           //"choose a time before "//about(sim%time()))
       else if (stands_still(sim) .or. has_come_to_rest(sim)) then
         if (limits%at_rest .and. is_at_rest(sim)) return
-        call fail_at_standstill(sim, evolution%last_event, error)
+        call fail_at_standstill(sim, merge(last_encounter(sim), evolution%last_event, is_at_rest(sim)), error)
       else
         call move_epoch(sim, by_event)
         call evolution%start(sim)
@@ -154,9 +154,9 @@ contains
 
   !> When a run has reached its number of events or collisions, reports whether time would stop
   !> advancing if the run continued. Time stops if all disks are at rest or one disk rests on a
-  !> side.
-  subroutine report_rest(evolution, sim, limits, error)
-    class(evolution_t), intent(in) :: evolution
+  !> side. The report depends on the state alone, because a run resumed at its limit predicts no
+  !> events.
+  subroutine report_rest(sim, limits, error)
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(inout) :: error
@@ -164,12 +164,12 @@ contains
 
     if (allocated(error) .or. .not. (sim%epoch_end > 0 .and. limits%reached(sim%tally) .and. sim%box%has_gravity())) return
     if (sim%n_inside() == 0 .or. sim%tally%has_at_most(limits%disks_inside)) return
-    last = evolution%last_event
     if (.not. is_at_rest(sim)) then
-      last(1) = disk_on_side(sim)
-      if (last(1) > 0) last(2) = sim%disk(last(1))%partner
+      last = disk_on_side(sim)
     else if (limits%at_rest) then
       return
+    else
+      last = last_encounter(sim)
     end if
     if (last(1) > 0) call fail_at_standstill(sim, last, error)
   end subroutine report_rest

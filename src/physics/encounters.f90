@@ -478,7 +478,8 @@ contains
     end associate
   end subroutine pass_sheared_boundary
 
-  !> Part of a message: disk i, its partner and the present time.
+  !> Part of a message: disk i, its partner and the present time. Of two disks, the one with the
+  !> lower id is first, whichever of them predicted the event.
   pure function encounter_text(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code      !! index of the disk and code of its partner; see `partners`
@@ -486,7 +487,8 @@ contains
 
     text = disk_text(i)
     if (code > 0) then
-      text = text//" and "//disk_text(code)
+      text = disk_text(merge(i, code, sim%tag(i)%id < sim%tag(code)%id))//" and " &
+        //disk_text(merge(code, i, sim%tag(i)%id < sim%tag(code)%id))
     else if (is_side(code)) then
       text = text//" and the "//sim%box%surface(1 - code)%name//" side"
     else if (is_wall(code)) then

@@ -206,6 +206,35 @@ def test_disks_at_rest_end_a_run_alike_whatever_stops_it(ricochet, tmp_path, sto
         ball.advance(events=300)
 
 
+@pytest.mark.parametrize("text", [BALL.format(height=2, restitution=0.5, more=""), PAIR])
+def test_a_simulation_loaded_at_its_limit_says_the_same(tmp_path, text):
+    """It executes no event, so that the report must follow from the state alone."""
+    path, events, said = tmp_path / "ball.h5", 0, None
+    ball = Simulation(text.format(height=1.3).replace("at_rest = .true.", "events = 999"))
+    while said is None:
+        events += 1
+        try:
+            ball.advance(events=events)
+        except ProgramError as error:
+            said = str(error)
+    assert ball.events == events
+    ball.save(path)
+    with pytest.raises(ProgramError) as again:
+        Simulation.load(path).advance(events=events)
+    assert str(again.value) == said and "disk 1 (ball) and the bottom side" in said
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_disk_that_has_just_bounced_does_not_rest_on_another_side(tmp_path, threads):
+    """The limit is the bounce of a disk that falls straight to the floor, far from other sides."""
+    disks = {"count": 2600, "packing_fraction": 0.1, "placement": "random", "velocity": [0, -1]}
+    law = {"wall_restitution": 0.5}
+    gas = Simulation({"species": disks, "box": {"gravity": [0, -1]}, "contact": law})
+    gas.advance(events=1).save(tmp_path / "gas.h5")
+    loaded = Simulation.load(tmp_path / "gas.h5", threads=threads).advance(events=1)
+    assert np.array_equal(loaded.advance(events=9).position, gas.advance(events=9).position)
+
+
 def test_bounces_lower_than_the_spacing_of_the_coordinates_are_rest(ricochet, tmp_path):
     """In a symmetric corner, rounding errors would make a disk bounce endlessly."""
     write_input(
