@@ -11,7 +11,7 @@ module library_files
   use output, only: output_t
   use run_files, only: check_name, output_of, source_of
   use run_input, only: input_from_text
-  use run_setup, only: new_simulation
+  use run_setup, only: choose_evolution, new_simulation
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
@@ -82,7 +82,8 @@ contains
     end if
     if (.not. allocated(error)) then
       call describe_system(session%input%settings, session%sim)
-      call read_checkpoint(output, session%input, session%sim, progress, finished, error)
+      call choose_evolution(session%input%settings, session%evolution)
+      call read_checkpoint(output, session%input, session%evolution, session%sim, progress, finished, error)
     end if
     if (allocated(list)) session%input%changes = list
     handle = begin(session, threads, error)

@@ -144,7 +144,8 @@ contains
       found = is_file(source_of(command%output))
       if (.not. found) found = is_file(command%output)     ! another run may have just renamed the output
       if (found .and. .not. command%check) call run%output%claim(command%output, error)
-      if (.not. allocated(error)) call read_checkpoint(command%output, run%input, sim, progress, finished, error)
+      if (.not. allocated(error)) &
+        call read_checkpoint(command%output, run%input, run%evolution, sim, progress, finished, error)
       if (.not. (found .or. allocated(error))) &
         call fail(error, exit_files, command%output//": another run has just created it; repeat the command later")
       ! The file already contains a checkpoint of the present state; writing another one would only

@@ -12,6 +12,7 @@ module checkpoint
   use build_info, only: build_flags
   use sampling_schedule, only: progress_t
   use errors, only: error_t, exit_files, exit_usage, fail
+  use evolution, only: evolution_t
   use h5md_layout, only: changes_at_work, checkpoint_group, earlier_changes, parameters_group
   use hdf5_objects, only: hdf5_file_t, scalar
   use hdf5_series, only: long_integer, series_t
@@ -314,9 +315,10 @@ contains
 
   !> Restores a run from its finished or unfinished output. On return, `progress` contains the
   !> numbers of samples in the output at the time of the checkpoint.
-  subroutine read_checkpoint(output, input, sim, progress, finished, error)
+  subroutine read_checkpoint(output, input, evolution, sim, progress, finished, error)
     character(len=*), intent(in) :: output      !! path of the finished output
     type(run_input_t), intent(in) :: input
+    class(evolution_t), intent(in) :: evolution !! dynamics that will continue the run
     !> On entry, a simulation with the box, contact law and species of the input.
     type(simulation_t), intent(inout) :: sim
     type(progress_t), intent(out) :: progress
@@ -342,15 +344,17 @@ contains
     call file%close()
     if (allocated(error)) return
     if (.not. sim%features%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
-    call check_changes(sim, source, error)
+    call check_changes(evolution, sim, source, error)
     call sim%simplify_masses()
     call sim%choose_units()
     call progress%schedule%look_ahead(sim)
   end subroutine read_checkpoint
 
   !> Reports an error if the scheduled changes before the checkpoint differ from those that the run
-  !> has made, or if a later change has a time that has already passed.
-  subroutine check_changes(sim, path, error)
+  !> has made, or if a later change has a time that has already passed. With time steps, a change
+  !> within a step is made at the end of the step; a run saved within this step can still make it.
+  subroutine check_changes(evolution, sim, path, error)
+    class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
@@ -361,8 +365,8 @@ contains
     else if (allocated(sim%schedule)) then
       if (sim%changes_made == size(sim%schedule)) return
       associate (change => sim%schedule(sim%changes_made + 1))
-        if (sim%has_reached(change%time)) call fail(error, exit_usage, change%origin//": its time has passed: the run continues " &
-          //"from time "//written(sim%time())//"; give a later time")
+        if (sim%has_reached(evolution%pause_at(change%time))) call fail(error, exit_usage, change%origin &
+          //": its time has passed: the run continues from time "//written(sim%time())//"; give a later time")
       end associate
     end if
   end subroutine check_changes

@@ -219,6 +219,24 @@ def test_a_run_with_changes_resumes_from_any_time_with_other_later_changes(progr
     assert "gas.nml:10: change.late: its time has passed" in passed.stderr
 
 
+def test_a_change_within_a_step_is_still_due_when_the_step_continues(
+    program, tmp_path, monkeypatch
+):
+    """A simulation is saved within a time step: after a change in it, which its end makes."""
+    monkeypatch.chdir(tmp_path)
+    text = """&run dynamics = 'steps' dt = 0.1 / &contact restitution = 1 / &stop time = 1 /
+        &species name = 'a' count = 50 packing_fraction = 0.3 speed = 1 /
+        &change name = 'c' time = 0.42 set = 'contact.restitution=0' /"""
+    whole = Simulation(text).advance(time=1)
+    gas = Simulation(text).advance(time=0.45)
+    gas.save("gas.h5", input="gas.nml")
+    loaded = Simulation.load("gas.h5").advance(time=1)
+    ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--quiet", check=True)
+    assert np.array_equal(loaded.velocity, whole.velocity)
+    assert np.array_equal(read_run("gas.h5").velocity[-1], whole.velocity)
+    assert whole.observable("dissipated_energy") > 0
+
+
 def test_the_balance_and_the_positions_of_sides_hold_across_changes(program, tmp_path):
     """The series of the side is continuous, and all observables exist from the start."""
     (tmp_path / "gas.nml").write_text(GAS)
