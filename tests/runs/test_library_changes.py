@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import random
 from pathlib import Path
 
 import numpy as np
@@ -216,6 +217,16 @@ def test_a_simulation_needs_no_stop(groups, program, tmp_path, monkeypatch):
     there = Simulation({**system, "stop": {"time": 0.5}}).advance()
     assert np.array_equal(read_run("box.h5").position[-1], there.position)
     assert Simulation.load("box.h5").advance(time=0.6).time == 0.6
+
+
+def test_an_input_that_is_written_and_read_again_has_the_same_radii():
+    """A radius follows from the packing fraction as given, not from that of the rounded radius."""
+    rng = random.Random(1)
+    for _ in range(200):
+        count, packing = rng.randint(2, 30), rng.uniform(0.01, 0.2)
+        gas = Simulation({"species": {"count": count, "packing_fraction": packing, "speed": 1}})
+        again = Simulation(gas.input)
+        assert again.input == gas.input and again.radius[0] == gas.radius[0], packing
 
 
 def test_an_input_is_saved_over_nothing_but_a_saved_one(tmp_path, monkeypatch):
