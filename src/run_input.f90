@@ -206,7 +206,26 @@ contains
     call drop_former_motion(before%groups, after%groups)
     call keep_sides(before%groups, after%groups, box, t)
     call resolve_input(after, complete, problems, .true., stepped)
+    if (problems%count == 0) call check_entries(after, box%epoch + t, problems)
   end subroutine changed_input
+
+  !> Reports sources whose interval is too short for the entries up to a time to be counted exactly.
+  !> The check of the input includes only times that are known without a change.
+  subroutine check_entries(input, t, problems)
+    type(run_input_t), intent(in) :: input
+    real(real64), intent(in) :: t                                   !! time since the start [time]
+    type(problem_list_t), intent(inout) :: problems
+    real(real64), parameter :: most = 1.0e15_real64
+    integer :: range(2), k
+
+    range = range_of(input%groups, ["source"])
+    do k = 1, range(2) - range(1) + 1
+      associate (source => input%settings%source(k), group => input%groups(range(1) + k - 1))
+        if (source%end_time >= t .and. t/source%interval > most) call group%complain("interval", &
+          written(t/source%interval)//" intervals until this change; allowed: up to "//written(most), problems)
+      end associate
+    end do
+  end subroutine check_entries
 
   !> Replaces an input by the input for the system after the first scheduled changes, which are then
   !> no longer scheduled.

@@ -31,6 +31,23 @@ GAS = """
 BASE = "&box upper = 2, 1 /\n&side name = 'right' open = .true. /\n"
 
 
+def test_a_change_to_an_interval_whose_entries_cannot_be_counted_is_refused(program, tmp_path):
+    """Without a stop time only the time of the change reveals it."""
+    text = (
+        "&species name = 'gas' count = 20 waiting = 5 radius = 0.01 speed = 1 /\n"
+        "&source name = 'pump' species = 'gas' interval = 0.1 temperature = 1 /\n"
+    )
+    with Simulation(text) as run:
+        run.advance(time=1)
+        with pytest.raises(ProgramError, match="interval: 1e18 intervals until this change"):
+            run.change({"source.pump.interval": 1e-18})
+        run.change({"source.pump.interval": 0.2})
+    change = "&change time = 1 set = 'source.pump.interval=1e-18' /\n"
+    (tmp_path / "gas.nml").write_text(f"{text}{change}&stop collisions = 10 /")
+    refused = ran(program, "gas.nml", "--check", cwd=tmp_path)
+    assert refused.returncode == 2 and "intervals until this change" in refused.stderr
+
+
 @pytest.fixture(scope="module")
 def whole(program, tmp_path_factory):
     """Execute the run of GAS with the serial engine."""
