@@ -311,7 +311,7 @@ contains
     self%has_departed = .true.
     self%last_count = 0
     call depart(sim, i, code, t, log)
-    if (sim%disk(i)%radius > self%search%patch%small) then
+    if (sim%disk(i)%radius > self%search%layout%small) then
       call self%start(sim)                         ! makes the lists of big disks anew
     else
       call self%search%take_out(sim%tag(i), i)

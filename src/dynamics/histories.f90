@@ -5,7 +5,7 @@
 module histories
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int16, int32, int64, real64
-  use cell_faces, only: patch_t
+  use cell_layout, only: cell_layout_t
   use memory_hints, only: prefetch
   use disks, only: disk_t, tag_t
   implicit none
@@ -23,7 +23,7 @@ module histories
   end type history_t
 
   type :: histories_t
-    type(patch_t) :: patch                         !! cells of the domain and its halo
+    type(cell_layout_t) :: layout                  !! cells of the domain and its halo
     integer(int32) :: n_histories = 0
     type(history_t), allocatable :: history(:)     !! histories of disks; size at least n_histories
     !> Index of the history of the disk in each slot; 0 without a history.
@@ -37,7 +37,7 @@ module histories
     !> disk has reached, and for its eight neighbours, otherwise 0.
     integer(int8), allocatable :: reached(:, :)
     !> Whether an owned disk has reached the edge of the extended domain.
-    logical :: left_patch = .false.
+    logical :: left_domain = .false.
   contains
     procedure :: record_collision
     procedure :: record_cell
@@ -60,7 +60,7 @@ contains
     class(histories_t), intent(inout) :: self
 
     self%reached = 0_int8
-    self%left_patch = .false.
+    self%left_domain = .false.
   end subroutine begin_window
 
   !> Starts a new history of disk i if the disk, in its present cell, can be a ghost in another
@@ -181,13 +181,13 @@ contains
     integer(int32) :: there(2), dx, dy
 
     if (.not. within(cell, self%safe_low, self%safe_high)) then
-      self%left_patch = .true.
+      self%left_domain = .true.
       return
     end if
     do dy = -1, 1
       do dx = -1, 1
         there = cell + [dx, dy]
-        where (self%patch%n == self%patch%whole) there = modulo(there - 1, self%patch%n) + 1
+        where (self%layout%n == self%layout%whole) there = modulo(there - 1, self%layout%n) + 1
         self%reached(there(1), there(2)) = 1_int8
       end do
     end do
@@ -240,7 +240,7 @@ contains
     yes = all(low <= self%own_high + 1 .and. high >= self%own_low - 1)
     if (yes) return
     from = max(low, 0)
-    to = min(high, self%patch%n + 1)
+    to = min(high, self%layout%n + 1)
     yes = any(self%reached(from(1):to(1), from(2):to(2)) > 0)
   end function could_have_met
 

@@ -24,7 +24,7 @@ contains
     found = 0
     associate (self => domain(k))
       self%n_corrections = 0
-      self%valid = self%done .and. .not. self%engine%histories%left_patch
+      self%valid = self%done .and. .not. self%engine%histories%left_domain
       do m = 1, size(self%neighbour)
         if (self%valid) call compare(self, domain(self%neighbour(m)), found)
       end do
@@ -40,27 +40,27 @@ contains
     integer(int32) :: r, s, t, cell(2), shift(2)
     logical :: met, near, same
 
-    shift = other%patch%first - self%patch%first
+    shift = other%layout%first - self%layout%first
     associate (mine => self%engine%histories, theirs => other%engine%histories)
       do r = 1, theirs%n_histories
         if (.not. theirs%history(r)%own) cycle
         t = theirs%history(r)%slot
         s = slot_of_ghost(self, other%sim%tag(t)%id)
-        cell = modulo(other%sim%tag(t)%cell + shift - 1, self%patch%whole) + 1
+        cell = modulo(other%sim%tag(t)%cell + shift - 1, self%layout%whole) + 1
         if (s > 0) then
           found = found + 1
           associate (history => mine%history(mine%history_of(s)))
-              ! ghosts outside the patch must be removed or corrected
+            ! ghosts outside the extended domain must be removed or corrected
             same = history%digest == theirs%history(r)%digest .and. same_state() &
-              .and. self%patch%holds(self%sim%tag(s)%cell)
-            if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
+              .and. self%layout%holds(self%sim%tag(s)%cell)
+            if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%layout%n)) cycle
             near = came_near(theirs%history(r), met)
             if (.not. met) met = mine%could_have_met(int(history%low, int32), int(history%high, int32))
           end associate
         else
           same = .false.
           near = came_near(theirs%history(r), met)
-          if (.not. (near .and. (met .or. all(cell <= self%patch%n)))) cycle
+          if (.not. (near .and. (met .or. all(cell <= self%layout%n)))) cycle
         end if
         if (met .and. .not. same) self%valid = .false.
         if (.not. self%valid) return
@@ -80,12 +80,12 @@ contains
 
       near = .false.
       met = .false.
-      reach = merge(1, 0, self%sim%box%periodic .and. self%patch%n < self%patch%whole)
+      reach = merge(1, 0, self%sim%box%periodic .and. self%layout%n < self%layout%whole)
       do iy = -reach(2), reach(2)
         do ix = -reach(1), reach(1)
-          low = history%low + shift + [ix, iy]*self%patch%whole
-          high = history%high + shift + [ix, iy]*self%patch%whole
-          if (any(low > self%patch%n .or. high < 1)) cycle
+          low = history%low + shift + [ix, iy]*self%layout%whole
+          high = history%high + shift + [ix, iy]*self%layout%whole
+          if (any(low > self%layout%n .or. high < 1)) cycle
           near = .true.
           met = met .or. self%engine%histories%could_have_met(low, high)
         end do
@@ -155,7 +155,7 @@ contains
       integer(int32) :: s, counter, window
 
       s = correction%slot
-      if (any(correction%cell > self%patch%n)) then
+      if (any(correction%cell > self%layout%n)) then
         if (s > 0) call leave(s)
         return
       end if
@@ -164,7 +164,7 @@ contains
         self%valid = s > 0 .and. self%valid          ! without a vacant slot, the domain must be loaded again
         if (s == 0) return
         self%vacant = self%global_index(s)
-      else if (self%patch%holds(self%sim%tag(s)%cell)) then
+      else if (self%layout%holds(self%sim%tag(s)%cell)) then
         call self%engine%search%take_out(self%sim%tag(s), s)
       end if
       window = self%sim%tag(s)%window
@@ -184,7 +184,7 @@ contains
     subroutine leave(s)
       integer(int32), intent(in) :: s
 
-      if (self%patch%holds(self%sim%tag(s)%cell)) call self%engine%search%take_out(self%sim%tag(s), s)
+      if (self%layout%holds(self%sim%tag(s)%cell)) call self%engine%search%take_out(self%sim%tag(s), s)
       call self%engine%histories%drop_history(s)
       self%sim%disk(s)%event_time = forever
       self%sim%disk(s)%partner = nothing

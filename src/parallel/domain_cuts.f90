@@ -1,16 +1,16 @@
 !> Spatial decomposition of a simulation into domains. The columns of cells are grouped into slabs,
 !> and each slab is divided into rectangles with about equal numbers of disks. Each rectangle is a
-!> domain. Together with the halo of cells around it, it forms the extended domain, also called its
-!> patch.
+!> domain. Together with the halo of cells around it, it forms the extended domain, whose
+!> cells are the `layout`.
 module domain_cuts
   use kinds, only: int16, int32, real64
-  use cell_faces, only: patch_t
+  use cell_layout, only: cell_layout_t
   implicit none
   private
   public :: domain_cuts_t
 
   type :: domain_cuts_t
-    type(patch_t) :: whole
+    type(cell_layout_t) :: whole
     integer(int32) :: halo = 0
     integer(int32) :: n = 0                        !! number of domains
     !> First and last column and row of each domain; shape (2, n)
@@ -19,7 +19,7 @@ module domain_cuts
     integer(int32), allocatable, private :: domain_of(:, :)!! domain of each row in each slab
   contains
     procedure :: cut
-    procedure :: patch_of
+    procedure :: layout_of
     procedure :: neighbours_of
   end type domain_cuts_t
 
@@ -29,7 +29,7 @@ contains
   !> wider than two halos.
   subroutine cut(self, whole, periodic, cell, wanted, threads, halo)
     class(domain_cuts_t), intent(inout) :: self
-    type(patch_t), intent(in) :: whole
+    type(cell_layout_t), intent(in) :: whole
     logical, intent(in) :: periodic(2)
     integer(int16), intent(in) :: cell(:, :)       !! cell of each disk; shape (2, disks)
     integer(int32), intent(in) :: wanted, threads, halo
@@ -116,42 +116,42 @@ contains
   end function pieces
 
   !> Extended domain of domain k, as a block of cells.
-  pure function patch_of(self, k, periodic) result(patch)
+  pure function layout_of(self, k, periodic) result(layout)
     class(domain_cuts_t), intent(in) :: self
     integer(int32), intent(in) :: k
     logical, intent(in) :: periodic(2)
-    type(patch_t) :: patch
+    type(cell_layout_t) :: layout
     integer(int32) :: last(2)
 
-    patch = self%whole
-    patch%first = self%low(:, k) - self%halo
+    layout = self%whole
+    layout%first = self%low(:, k) - self%halo
     last = self%high(:, k) + self%halo
     where (.not. periodic .or. (self%low(:, k) == 1 .and. self%high(:, k) == self%whole%n))
-      patch%first = max(patch%first, 1)
+      layout%first = max(layout%first, 1)
       last = min(last, self%whole%n)
     end where
-    patch%n = last - patch%first + 1
-    call patch%find_sides(periodic)
-  end function patch_of
+    layout%n = last - layout%first + 1
+    call layout%find_sides(periodic)
+  end function layout_of
 
   !> Indices of the domains that own disks in the halo of domain k.
-  pure function neighbours_of(self, k, patch) result(list)
+  pure function neighbours_of(self, k, layout) result(list)
     class(domain_cuts_t), intent(in) :: self
     integer(int32), intent(in) :: k
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     integer(int32), allocatable :: list(:)
     logical :: near(self%n), slab(size(self%domain_of, 2))
     integer(int32) :: ix, iy, m
 
     slab = .false.
-    do ix = 1, patch%n(1)
-      slab(self%slab_of(patch%place_of(ix, 1))) = .true.
+    do ix = 1, layout%n(1)
+      slab(self%slab_of(layout%place_of(ix, 1))) = .true.
     end do
     near = .false.
     do m = 1, size(slab, kind=int32)
       if (.not. slab(m)) cycle
-      do iy = 1, patch%n(2)
-        near(self%domain_of(patch%place_of(iy, 2), m)) = .true.
+      do iy = 1, layout%n(2)
+        near(self%domain_of(layout%place_of(iy, 2), m)) = .true.
       end do
     end do
     near(k) = .false.

@@ -1,11 +1,11 @@
-!> One domain of a divided simulation, with its own event-driven engine. A domain owns the disks in
-!> a rectangle of cells and contains ghosts (copies) of the disks in the halo around it; rectangle
-!> and halo form the extended domain, `patch`. Disks that would enter the extended domain during a
-!> time window are missing. Errors in the motion of ghosts therefore spread inwards from its edge,
-!> until `domain_borders` corrects the ghosts after the window.
+!> ne domain of a divided simulation, with its own event-driven engine. A domain owns the disks in
+!> rectangle of cells and contains ghosts (copies) of the disks in the halo around it; rectangle nd
+!> halo form the extended domain, with the cells in `layout`. Disks that would enter the extended
+!> domain during a ime window are missing. Errors in the motion of ghosts therefore spread inwards
+!> from its edge, ntil `domain_borders` corrects the ghosts after the window.
 module domains
   use kinds, only: int32, int64, real64
-  use cell_faces, only: patch_t
+  use cell_layout, only: cell_layout_t
   use disks, only: disk_t, tag_t, whole_disk_t
   use errors, only: error_t
   use event_driven, only: event_driven_t
@@ -43,7 +43,7 @@ module domains
     integer(int32) :: halo = 0                     !! width of the halo [cells]
     !> Indices of the domains that own disks in this extended domain.
     integer(int32), allocatable :: neighbour(:)
-    type(patch_t) :: patch
+    type(cell_layout_t) :: layout
     !> Owned disks and ghosts, with some vacant array elements (slots). The time origin is that of
     !> the whole simulation.
     type(simulation_t) :: sim
@@ -122,20 +122,20 @@ contains
       integer(int32) :: k
 
       self%engine%search%is_part = .true.
-      self%engine%search%patch = self%patch
-      associate (patch => self%patch, histories => self%engine%histories)
-        histories%patch = self%patch
-        histories%own_low = modulo(self%low - patch%first, patch%whole) + 1
+      self%engine%search%layout = self%layout
+      associate (layout => self%layout, histories => self%engine%histories)
+        histories%layout = self%layout
+        histories%own_low = modulo(self%low - layout%first, layout%whole) + 1
         histories%own_high = histories%own_low + self%high - self%low
         cut_low = histories%own_low > 1
-        cut_high = histories%own_high < patch%n
+        cut_high = histories%own_high < layout%n
         histories%deep_low = histories%own_low + merge(self%halo, 0, cut_low)
         histories%deep_high = histories%own_high - merge(self%halo, 0, cut_high)
-        histories%safe_low = merge(2, 1, cut_low .and. (self%sim%box%periodic .or. patch%first > 1))
-        histories%safe_high = patch%n - merge(1, 0, cut_high .and. (self%sim%box%periodic &
-          .or. patch%first + patch%n - 1 < patch%whole))
+        histories%safe_low = merge(2, 1, cut_low .and. (self%sim%box%periodic .or. layout%first > 1))
+        histories%safe_high = layout%n - merge(1, 0, cut_high .and. (self%sim%box%periodic &
+          .or. layout%first + layout%n - 1 < layout%whole))
         if (allocated(histories%reached)) deallocate (histories%reached)
-        allocate (histories%reached(0:patch%n(1) + 1, 0:patch%n(2) + 1))
+        allocate (histories%reached(0:layout%n(1) + 1, 0:layout%n(2) + 1))
         if (allocated(histories%history_of)) deallocate (histories%history_of)
         allocate (histories%history_of(self%sim%n_disks()), source=0)
         if (.not. allocated(histories%history)) allocate (histories%history(1024))

@@ -4,8 +4,7 @@
 !> of the domains are wrong, and all domains must be loaded again.
 module partition
   use kinds, only: int16, int32, int64, real64
-  use cell_faces, only: patch_t
-  use cell_layout, only: whole_box
+  use cell_layout, only: cell_layout_t, whole_box
   use domain_borders, only: compare_ghosts, correct_ghosts
   use domain_cuts, only: domain_cuts_t
   use domains, only: advance_domain, domain_t, load, next_time, write_back
@@ -50,7 +49,7 @@ module partition
     !> Maximum number of iterations of one engine in a step, relative to the number expected in all
     !> domains together.
     real(real64) :: overload = 4.0_real64
-    type(patch_t) :: whole                         !! block of all cells of the box, constant during a run
+    type(cell_layout_t) :: whole                   !! block of all cells of the box, constant during a run
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
     real(real64) :: event_rate = 0.0_real64        !! events per unit of time; 0 if not known yet [1/time]
@@ -100,13 +99,13 @@ contains
     !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
       associate (domain => self%domain(k))
-        domain%patch = self%cuts%patch_of(k, sim%box%periodic)
+        domain%layout = self%cuts%layout_of(k, sim%box%periodic)
         domain%halo = self%cuts%halo
         domain%low = self%cuts%low(:, k)
         domain%high = self%cuts%high(:, k)
-        domain%neighbour = self%cuts%neighbours_of(k, domain%patch)
+        domain%neighbour = self%cuts%neighbours_of(k, domain%layout)
         if (listing .and. .not. allocated(domain%log)) allocate (domain%log)
-        call load(domain, sim, pack([(i, i=1, sim%n_disks())], domain%patch%covers(cell)))
+        call load(domain, sim, pack([(i, i=1, sim%n_disks())], domain%layout%covers(cell)))
       end associate
     end do
     !$omp end parallel do

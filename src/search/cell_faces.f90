@@ -7,6 +7,7 @@ module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t
   use box_sides, only: side_time
+  use cell_layout, only: cell_layout_t
   use disks, only: disk_t
   use free_flight, only: flight, flight_velocity, slowest, time_to_line
   use neighbour_search, only: prediction_t
@@ -14,35 +15,7 @@ module cell_faces
   use shapes, only: spare
   implicit none
   private
-  public :: all_cells, cell_faces_t, line_t, patch_t
-
-  !> A rectangular block of cells: usually all cells of the box; in a parallel run, the cells of a
-  !> domain and its halo, possibly across a periodic side. A disk that crosses an outer face leaves
-  !> the block, unless the face is a side of the box.
-  type :: patch_t
-    integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the whole box
-    !> First column and row of the block; below 1 if the block starts beyond a periodic side of the
-    !> box.
-    integer(int32) :: first(2) = 1
-    integer(int32) :: n(2) = 0                     !! numbers of columns and rows in the block
-    real(real64) :: small = 0.0_real64      !! maximum radius for which the cells are wide enough [length]
-    real(real64) :: reach = 0.0_real64    !! maximum distance between the centres of disks in contact [length]
-    real(real64) :: lower(2) = 0.0_real64          !! lower left corner of the box [length]
-    real(real64) :: width(2) = 0.0_real64          !! distance between adjacent cells [length]
-    ! Along an axis with a periodic side inside the block, `last` is the column or row just before
-    ! this side and `next` the one just behind it. Along an axis without such a side, both are 0.
-    integer(int32) :: last(2) = 0
-    integer(int32) :: next(2) = 0
-  contains
-    procedure :: find_sides
-    procedure :: cell_at
-    procedure :: place_of
-    procedure :: holds
-    procedure :: at_seam
-    procedure :: covers
-    procedure :: step
-    procedure :: equals
-  end type patch_t
+  public :: cell_faces_t, line_t
 
   !> A line parallel to an axis that bounds a cell: a face of a column or row of cells, or a side of
   !> the box.
@@ -88,130 +61,15 @@ module cell_faces
 
 contains
 
-  !> The block of all cells of a box with n(1) columns and n(2) rows.
-  pure function all_cells(box, n, reach) result(patch)
-    type(box_t), intent(in) :: box
-    integer(int32), intent(in) :: n(2)
-    real(real64), intent(in) :: reach     !! maximum distance between the centres of disks in contact [length]
-    type(patch_t) :: patch
-
-    patch%whole = n
-    patch%n = n
-    patch%reach = reach
-    patch%lower = box%lower
-    ! The cells are made slightly wider, so that rounding errors cannot put the last face inside the
-    ! box.
-    patch%width = box%edges()/n*(1 + 4*epsilon(reach))
-    call patch%find_sides(box%periodic)
-  end function all_cells
-
-  !> Finds the columns and rows beside periodic sides inside the block.
-  pure subroutine find_sides(self, periodic)
-    class(patch_t), intent(inout) :: self
-    logical, intent(in) :: periodic(2)
-
-    self%last = modulo(self%whole - self%first, self%whole) + 1
-    self%next = modulo(self%last, self%whole) + 1
-    where (.not. periodic .or. self%last > self%n .or. self%next > self%n)
-      self%last = 0
-      self%next = 0
-    end where
-  end subroutine find_sides
-
-  !> Column and row, within the block, of a point of the box; greater than `n` outside the block.
-  pure function cell_at(self, x) result(cell)
-    class(patch_t), intent(in) :: self
-    real(real64), intent(in) :: x(2)               !! [length]
-    integer(int32) :: cell(2)
-
-    cell = min(max(int((x - self%lower)/self%width, int32) + 1, 1), self%whole)
-    if (self%first(1) /= 1 .or. self%first(2) /= 1) cell = modulo(cell - self%first, self%whole) + 1
-  end function cell_at
-
-  !> Converts a column or row number of the block to that of the grid of the whole box.
-  elemental function place_of(self, cell, axis) result(place)
-    class(patch_t), intent(in) :: self
-    integer(int32), intent(in) :: cell
-    integer, intent(in) :: axis
-    integer(int32) :: place
-
-    place = modulo(self%first(axis) + cell - 2, self%whole(axis)) + 1
-  end function place_of
-
-  !> True if a cell belongs to the block.
-  pure function holds(self, cell) result(yes)
-    class(patch_t), intent(in) :: self
-    integer(int16), intent(in) :: cell(2)
-    logical :: yes
-
-    yes = all(cell >= 1 .and. cell <= self%n)
-  end function holds
-
-  !> True if all given cells, numbered as in the grid of the whole box, belong to the block.
-  pure function covers(self, cell) result(yes)
-    class(patch_t), intent(in) :: self
-    integer(int16), intent(in) :: cell(:, :)       !! shape (2, n)
-    logical :: yes(size(cell, 2))
-
-    yes = modulo(cell(1, :) - self%first(1), self%whole(1)) < self%n(1) &
-      .and. modulo(cell(2, :) - self%first(2), self%whole(2)) < self%n(2)
-  end function covers
-
-  !> True if any of the eight neighbours of a cell is beyond a periodic side.
-  pure function at_seam(self, cell) result(yes)
-    class(patch_t), intent(in) :: self
-    integer(int16), intent(in) :: cell(2)
-    logical :: yes
-
-    yes = any(cell == self%last .or. cell == self%next)
-  end function at_seam
-
-  !> Finds the column or row `ahead` steps away from a given one, and the number of periodic sides
-  !> between them.
-  pure subroutine step(self, axis, cell, ahead, there, periods)
-    class(patch_t), intent(in) :: self
-    integer, intent(in) :: axis
-    integer(int32), intent(in) :: cell, ahead
-    integer(int32), intent(out) :: there, periods
-
-    there = cell + ahead
-    periods = 0
-    associate (last => self%last(axis), n => self%n(axis))
-      if (last == 0) return
-      ! the periodic side is inside the block
-      if (last < n) periods = merge(1, 0, there > last) - merge(1, 0, cell > last)
-      if (last < n) return
-      do while (there > n)
-        there = there - n
-        periods = periods + 1
-      end do
-      do while (there < 1)
-        there = there + n
-        periods = periods - 1
-      end do
-    end associate
-  end subroutine step
-
-  !> True if two blocks consist of the same cells and were chosen for disks of the same sizes.
-  pure function equals(self, other) result(yes)
-    class(patch_t), intent(in) :: self
-    type(patch_t), intent(in) :: other
-    logical :: yes
-
-    yes = all(self%whole == other%whole) .and. all(self%first == other%first) .and. all(self%n == other%n) &
-      .and. abs(self%small - other%small) <= 0 .and. abs(self%reach - other%reach) <= 0 &
-      .and. all(abs(self%lower - other%lower) <= 0) .and. all(abs(self%width - other%width) <= 0)
-  end function equals
-
   !> Sets up the faces of the cells in a block.
-  subroutine set(self, box, patch, now)
+  subroutine set(self, box, layout, now)
     class(cell_faces_t), intent(out) :: self
     type(box_t), intent(in) :: box
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     real(real64), intent(in) :: now
 
-    self%width = patch%width
-    self%overlap = max(self%width - patch%reach, 0.0_real64)
+    self%width = layout%width
+    self%overlap = max(self%width - layout%reach, 0.0_real64)
     self%moving = any(box%side%moves())
     self%falling = box%has_gravity() .or. self%moving
     self%periodic = box%periodic
@@ -221,7 +79,7 @@ contains
     call cut(2, self%row)
     call find_struck(1, self%column)
     call find_struck(2, self%row)
-    call self%find_strips(box, patch%small, now)
+    call self%find_strips(box, layout%small, now)
   contains
 
     !> Sets up the faces of columns (axis 1) or rows (axis 2).
@@ -233,15 +91,15 @@ contains
       low = 2 - 2*axis                               ! codes of the two sides
       high = low - 1
       inset = merge(0, 1, box%periodic(axis) .or. box%open([1 - low, 1 - high]))
-      allocate (line(0:1, patch%n(axis)))
-      do k = 1, patch%n(axis)
-        place = patch%place_of(k, axis)
+      allocate (line(0:1, layout%n(axis)))
+      do k = 1, layout%n(axis)
+        place = layout%place_of(k, axis)
         line(0, k) = line_t(box%lower(axis) + self%width(axis)*(place - 1) - 0.5_real64*self%overlap(axis), &
           0.0_real64, crossing(low))
         line(1, k) = line_t(box%lower(axis) + self%width(axis)*place + 0.5_real64*self%overlap(axis), &
           0.0_real64, crossing(high))
         if (place == 1) line(0, k) = line_t(box%lower(axis), inset(1), low)
-        if (place == patch%whole(axis)) line(1, k) = line_t(box%upper(axis), -inset(2), high)
+        if (place == layout%whole(axis)) line(1, k) = line_t(box%upper(axis), -inset(2), high)
       end do
     end subroutine cut
 
@@ -254,7 +112,7 @@ contains
 
       reach = box%side_excursion()
       moves = box%side%moves()
-      associate (within => (reach(axis, :) + patch%small)*(1 + spare))
+      associate (within => (reach(axis, :) + layout%small)*(1 + spare))
         line(0, :)%struck = moves(2*axis - 1) .and. line(0, :)%place <= box%lower(axis) + within(1)
         line(1, :)%struck = moves(2*axis) .and. line(1, :)%place >= box%upper(axis) - within(2)
       end associate

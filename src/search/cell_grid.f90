@@ -6,8 +6,8 @@ module cell_grid
   use box_geometry, only: box_t, next_obstacle
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
-  use cell_faces, only: cell_faces_t, patch_t
-  use cell_layout, only: whole_box
+  use cell_faces, only: cell_faces_t
+  use cell_layout, only: cell_layout_t, whole_box
   use cell_scans, only: add_chains_around, scan_around_seam, scan_disks, scan_list, scan_reach, scan_rim, test_list
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
@@ -25,7 +25,7 @@ module cell_grid
 
   type :: cell_grid_t
     private
-    type(patch_t), public :: patch               !! block of cells, chosen by `build` or by a domain
+    type(cell_layout_t), public :: layout        !! block of cells, chosen by `build` or by a domain
     logical, public :: is_part = .false.
     logical, public :: undivided = .false.       !! whether a single cell contains all disks
     logical, public :: everyone = .false.        !! whether all disks are predicted anew after each event
@@ -63,24 +63,24 @@ contains
     integer(int32) :: i
     integer(int16) :: ix, iy
 
-    if (.not. self%is_part) self%patch = whole_box(sim, self%undivided)
+    if (.not. self%is_part) self%layout = whole_box(sim, self%undivided)
     self%images = sim%images()
-    call self%faces%set(sim%box, self%patch, sim%now)
-    kept = sim%box%has_obstacles() .and. self%reach%serves(self%patch, self%faces) .and. .not. self%lists%used
+    call self%faces%set(sim%box, self%layout, sim%now)
+    kept = sim%box%has_obstacles() .and. self%reach%serves(self%layout, self%faces) .and. .not. self%lists%used
     if (kept) call clear_cells(self, sim, kept)
-    associate (patch => self%patch)
-      if (.not. kept) call self%cells%empty(patch%n(1) + 2, patch%n(2) + 2, sim%n_disks())
+    associate (layout => self%layout)
+      if (.not. kept) call self%cells%empty(layout%n(1) + 2, layout%n(2) + 2, sim%n_disks())
       call fill_cells(self, sim)
       if (kept) then
         rims = self%reach%rims()
-        call self%reach%renew_big(sim, patch, self%faces)
+        call self%reach%renew_big(sim, layout, self%faces)
         rims = [rims, self%reach%rims()]
       else
-        call self%reach%renew(sim, patch, self%faces)
+        call self%reach%renew(sim, layout, self%faces)
       end if
       call list_all(self, sim)
-      self%roomy = any(self%faces%width > spacious*patch%reach) .and. .not. self%lists%used
-      self%plain_radius = merge(-1.0_real64, patch%small, self%lists%used)
+      self%roomy = any(self%faces%width > spacious*layout%reach) .and. .not. self%lists%used
+      self%plain_radius = merge(-1.0_real64, layout%small, self%lists%used)
       if (kept .and. .not. self%lists%used) then
         do i = 1, size(rims, kind=int32)
           call mark(self, int(rims(i)%cell, int16))
@@ -88,8 +88,8 @@ contains
         return
       end if
       if (.not. (any(sim%box%periodic) .or. allocated(self%reach%first) .or. self%is_part .or. self%lists%used)) return
-      do iy = 0, int(patch%n(2) + 1, int16)
-        do ix = 0, int(patch%n(1) + 1, int16)
+      do iy = 0, int(layout%n(2) + 1, int16)
+        do ix = 0, int(layout%n(1) + 1, int16)
           call mark(self, [ix, iy])
         end do
       end do
@@ -107,7 +107,7 @@ contains
     if (sim%n_disks() /= size(self%cells%next)) return
     n = 0
     do i = 1, sim%n_disks()
-      if (any(sim%tag(i)%cell < 1 .or. sim%tag(i)%cell > self%patch%n)) cycle
+      if (any(sim%tag(i)%cell < 1 .or. sim%tag(i)%cell > self%layout%n)) cycle
       call self%cells%clear(self%cells%number(sim%tag(i)%cell), n)
     end do
     all_found = n == self%n_listed
@@ -121,13 +121,13 @@ contains
     integer(int16) :: cell(2)
 
     self%n_listed = 0
-    associate (patch => self%patch)
+    associate (layout => self%layout)
       do i = 1, sim%n_disks()
         if (.not. sim%is_inside(i)) cycle
-        if (sim%disk(i)%radius > patch%small) then
+        if (sim%disk(i)%radius > layout%small) then
           sim%tag(i)%cell = 1                      ! cell (1,1), which is always marked
         else if (sim%tag(i)%id > 0) then
-          cell = int(patch%cell_at(sim%position(i)), int16)
+          cell = int(layout%cell_at(sim%position(i)), int16)
           call put(self, sim%tag(i), i, cell)
           self%n_listed = self%n_listed + 1
         end if
@@ -143,10 +143,10 @@ contains
 
     self%lists%used = .false.
     if (self%undivided .or. sim%box%is_sheared()) return
-    call self%lists%prepare(sim%disk, sim%tag, sim%box%lower, sim%box%edges(), self%patch)
+    call self%lists%prepare(sim%disk, sim%tag, sim%box%lower, sim%box%edges(), self%layout)
     if (.not. self%lists%used) return
     do i = 1, sim%n_disks()
-      if (sim%tag(i)%id > 0 .and. sim%disk(i)%radius <= self%patch%small .and. sim%is_inside(i)) call self%list(sim, i)
+      if (sim%tag(i)%id > 0 .and. sim%disk(i)%radius <= self%layout%small .and. sim%is_inside(i)) call self%list(sim, i)
     end do
   end subroutine list_all
 
@@ -167,7 +167,7 @@ contains
     type(tag_t), intent(in) :: tag
     integer(int32), intent(in) :: i
 
-    if (self%lists%used) call self%lists%leave(i, self%cells, self%patch, tag%cell)
+    if (self%lists%used) call self%lists%leave(i, self%cells, self%layout, tag%cell)
     call take(self, tag, i)
   end subroutine take_out
 
@@ -195,9 +195,9 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
 
-    if (.not. self%patch%holds(sim%tag(i)%cell)) return
+    if (.not. self%layout%holds(sim%tag(i)%cell)) return
     call self%lists%lay(i, sim%disk(i)%radius, sim%position(i), self%faces, sim%tag(i)%cell)
-    call self%lists%enter(i, self%cells, self%patch, sim%tag(i)%cell)
+    call self%lists%enter(i, self%cells, self%layout, sim%tag(i)%cell)
   end subroutine list
 
   !> Marks a cell that needs the general procedure, near obstacles, big disks or periodic images.
@@ -206,8 +206,8 @@ contains
     integer(int16), intent(in) :: cell(2)
     logical :: special
 
-    special = .not. self%patch%holds(cell) .or. (size(self%reach%big) > 0 .and. all(cell == 1)) .or. self%lists%used
-    if (.not. special) special = self%patch%at_seam(cell) .or. self%reach%has_any(cell)
+    special = .not. self%layout%holds(cell) .or. (size(self%reach%big) > 0 .and. all(cell == 1)) .or. self%lists%used
+    if (.not. special) special = self%layout%at_seam(cell) .or. self%reach%has_any(cell)
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
@@ -220,7 +220,7 @@ contains
     integer :: m
 
     allocate (rim, source=self%reach%big(number)%rim)
-    call self%reach%follow(sim, number, self%patch, self%faces)
+    call self%reach%follow(sim, number, self%layout, self%faces)
     rim = [rim, self%reach%big(number)%rim]
     do m = 1, size(rim)
       call mark(self, int(rim(m)%cell, int16))
@@ -247,10 +247,10 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
 
-    if (sim%disk(i)%radius > self%patch%small) then
+    if (sim%disk(i)%radius > self%layout%small) then
       call self%follow_big(sim, self%reach%number_of(i))
     else
-      call self%lists%leave(i, self%cells, self%patch, sim%tag(i)%cell)
+      call self%lists%leave(i, self%cells, self%layout, sim%tag(i)%cell)
       if (code > looks_again) call change_cell(self, sim, i, code)
       call self%list(sim, i)
     end if
@@ -270,13 +270,13 @@ contains
     axis = axis_of(side)
     cell = sim%tag(i)%cell
     cell(axis) = cell(axis) + int(sense_of(side), int16)
-    if (is_wall(code) .and. self%patch%last(axis) > 0) then
+    if (is_wall(code) .and. self%layout%last(axis) > 0) then
       ! shear displaces the image
-      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)
-      cell(axis) = int(merge(self%patch%next(axis), self%patch%last(axis), sense_of(side) > 0), int16)
+      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%layout%cell_at(sim%position(i)), int16)
+      cell(axis) = int(merge(self%layout%next(axis), self%layout%last(axis), sense_of(side) > 0), int16)
     end if
     inside = .true.
-    if (self%is_part) inside = self%patch%holds(cell)
+    if (self%is_part) inside = self%layout%holds(cell)
     if ((self%roomy .or. self%lists%used) .and. inside) call self%faces%choose_cell(sim%box%gravity, sim%disk(i), sim%now, cell)
     call move(self, sim%tag(i), i, cell)
   end subroutine change_cell
@@ -290,7 +290,7 @@ contains
     integer(int32), intent(in) :: i
     integer(int16) :: cell(2)
 
-    if (disk%radius > self%patch%small) return
+    if (disk%radius > self%layout%small) return
     cell = tag%cell
     call self%faces%choose_cell(gravity, disk, disk%clock, cell)
     if (cell(1) /= tag%cell(1) .or. cell(2) /= tag%cell(2)) call move(self, tag, i, cell)
@@ -378,7 +378,7 @@ contains
     integer(int32), intent(in) :: i
     logical :: yes
 
-    yes = self%lists%is_short(i) .and. .not. self%patch%at_seam(cell)
+    yes = self%lists%is_short(i) .and. .not. self%layout%at_seam(cell)
   end function is_plainly_listed
 
   !> Predicts the next events of two disks from their neighbour lists after their collision.
@@ -505,9 +505,9 @@ contains
 
     near%disk = i
     known = merge(latest_clock, 0, has_collided) + merge(0, no_gravity, self%faces%falling)
-    if (sim%disk(i)%radius > self%patch%small) then
+    if (sim%disk(i)%radius > self%layout%small) then
       call self%find_event_of_big(sim, known, near)
-    else if (.not. self%patch%holds(sim%tag(i)%cell)) then
+    else if (.not. self%layout%holds(sim%tag(i)%cell)) then
       call self%take_out(sim%tag(i), i)
       sim%disk(i)%collision_counter = sim%disk(i)%collision_counter + 1
       near%time = 2*never
@@ -583,11 +583,11 @@ contains
 
     associate (cell => sim%tag(near%disk)%cell)
       near%cell = self%cells%number(cell)
-      if (self%patch%at_seam(cell)) then
-        t = self%images%valid_until(sim%now, self%patch%width(1))
+      if (self%layout%at_seam(cell)) then
+        t = self%images%valid_until(sim%now, self%layout%width(1))
         if (t < near%time) near%partner = looks_again
         near%time = min(t, near%time)
-        call scan_around_seam(self%cells, self%patch, sim, self%images, known, near)
+        call scan_around_seam(self%cells, self%layout, sim, self%images, known, near)
       else
         call gather(self%cells%cell, near%cell, self%cells%stride, near%disk, near%list, near%n)
         if (self%cells%is_crowded_around(near%cell)) call add_chains_around(self%cells, sim, known, near)

@@ -4,7 +4,7 @@ module cell_scans
   use kinds, only: int32, int64, real64
   use box_geometry, only: find_image_contact, stays_clear
   use cell_contents, only: append, cell_capacity, cell_contents_t
-  use cell_faces, only: patch_t
+  use cell_layout, only: cell_layout_t
   use images, only: image_t, images_t
   use neighbour_lists, only: neighbour_lists_t
   use neighbour_search, only: earliest_contact, latest_clock, list_capacity, no_gravity, prediction_t
@@ -244,9 +244,9 @@ contains
   !> Finds contacts of a disk near a periodic side, beyond which some of the 3 x 3 cells around it
   !> lie. Cells of the same periodic image are searched together. A sheared box, whose images above
   !> and below move along x, requires `scan_around_moving_seam` instead.
-  subroutine scan_around_seam(cells, patch, sim, images, known, near)
+  subroutine scan_around_seam(cells, layout, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
@@ -254,13 +254,13 @@ contains
     integer(int32) :: own(2), row(-1:1), above(-1:1), column(-1:1), beside(-1:1), low, high, left, right, k
 
     if (abs(images%velocity) > 0) then
-      call scan_around_moving_seam(cells, patch, sim, images, known, near)
+      call scan_around_moving_seam(cells, layout, sim, images, known, near)
       return
     end if
     own = sim%tag(near%disk)%cell
     do k = -1, 1
-      call patch%step(1, own(1), k, column(k), beside(k))
-      call patch%step(2, own(2), k, row(k), above(k))
+      call layout%step(1, own(1), k, column(k), beside(k))
+      call layout%step(2, own(2), k, row(k), above(k))
     end do
     low = -1
     do while (low <= 1)                            ! rows of the same image are adjacent
@@ -321,9 +321,9 @@ contains
   !> Version of `scan_around_seam` for sheared boxes, whose images above and below move along x. In
   !> these images six columns are searched instead of three, so that no contact is missed before the
   !> images have moved by the width of a column.
-  subroutine scan_around_moving_seam(cells, patch, sim, images, known, near)
+  subroutine scan_around_moving_seam(cells, layout, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     type(simulation_t), intent(in) :: sim
     type(images_t), intent(in) :: images
     integer(int32), intent(in) :: known            !! as in `earliest_contact`
@@ -333,7 +333,7 @@ contains
 
     own = sim%tag(near%disk)%cell
     do k = -1, 1
-      call patch%step(2, own(2), k, row(k), above(k))
+      call layout%step(2, own(2), k, row(k), above(k))
     end do
     do y = above(-1), above(1)
       first = -1
@@ -342,11 +342,11 @@ contains
       if (y /= 0) then
         displacement = images%displacement(real(y, real64), sim%now)
         periods = anint(displacement/images%period(1))
-        first = -nint((displacement - periods*images%period(1))/patch%width(1)) - merge(3, 2, y*images%velocity > 0)
+        first = -nint((displacement - periods*images%period(1))/layout%width(1)) - merge(3, 2, y*images%velocity > 0)
         columns = 6
       end if
       do k = 1, columns
-        call patch%step(1, own(1), first + k - 1, column(k), beside(k))
+        call layout%step(1, own(1), first + k - 1, column(k), beside(k))
       end do
       do x = beside(1), beside(columns)
         n = 0

@@ -1,6 +1,6 @@
 !> Grids of equal cells for searches outside the event loop: the placement of disks, obstacles near
 !> a point, time steps, and the sorting of disks in memory. The event loop uses a separate grid of
-!> overlapping cells (`cell_faces`). Both grids use the lists of objects in cells defined here.
+!> overlapping cells (`cell_layout`). Both grids use the lists of objects in cells defined here.
 module grid
   use kinds, only: int32, real64
   implicit none

@@ -20,7 +20,8 @@ module neighbour_lists
   use, intrinsic :: iso_fortran_env, only: real32
   use kinds, only: int16, int32, int64, pi, real64
   use cell_contents, only: append, cell_contents_t
-  use cell_faces, only: cell_faces_t, line_t, patch_t
+  use cell_faces, only: cell_faces_t, line_t
+  use cell_layout, only: cell_layout_t
   use disks, only: disk_t, tag_t
   use memory_hints, only: prefetch
   use neighbour_search, only: list_capacity, prediction_t
@@ -84,7 +85,7 @@ module neighbour_lists
     integer(int32) :: parts = 1
     !> Maximum radius plus margin of disks in narrow cells [length].
     real(real32) :: narrow_extent = 0.0_real32
-    type(patch_t) :: narrow_patch                  !! the narrow cells, which subdivide the cells of the box
+    type(cell_layout_t) :: narrow_layout           !! the narrow cells, which subdivide the cells of the box
     type(cell_contents_t) :: narrow                !! disks in narrow cells
     type(cell_contents_t) :: wide                  !! all other disks with lists, in wide cells
   contains
@@ -108,26 +109,26 @@ contains
   !> after a collision tests fewer disks, but the lists must be renewed, more often at lower
   !> densities. `least_candidates` and the width of the neighbourhoods were optimised for
   !> polydisperse disks.
-  subroutine prepare(self, disk, tag, lower, edges, patch)
+  subroutine prepare(self, disk, tag, lower, edges, layout)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(in) :: tag(:)
     real(real64), intent(in) :: lower(2), edges(2) !! lower left corner and edges of the box [length]
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     real(real64) :: area, packing, candidates, radii(2)
     integer(int32) :: i, n
 
     self%used = .false.
     n = size(disk, kind=int32)
-    if (n > most_listed .or. .not. patch%small > 0) return
-    area = product(patch%n*patch%width)
-    candidates = min(9*product(patch%width)/area, 1.0_real64)*n
-    packing = min(n*pi*patch%small**2/area, 0.9_real64)            ! an upper bound
+    if (n > most_listed .or. .not. layout%small > 0) return
+    area = product(layout%n*layout%width)
+    candidates = min(9*product(layout%width)/area, 1.0_real64)*n
+    packing = min(n*pi*layout%small**2/area, 0.9_real64)           ! an upper bound
     if (candidates < self%least_candidates - 27*packing) return
     n = 0
     radii = 0
     do i = 1, size(disk, kind=int32)
-      if (tag(i)%id == 0 .or. disk(i)%radius > patch%small) cycle
+      if (tag(i)%id == 0 .or. disk(i)%radius > layout%small) cycle
       n = n + 1
       radii = radii + disk(i)%radius**[1, 2]
     end do
@@ -137,7 +138,7 @@ contains
     self%mean_radius = radii(1)/n
     self%margin = max(0.6_real64 + 2.5_real64*(0.72_real64 - packing), 0.3_real64)*self%mean_radius
     call self%make_room(disk, lower, edges)
-    call self%cut_cells(patch, int(minval(patch%width)/(narrow_width*(self%mean_radius + self%margin)), int32))
+    call self%cut_cells(layout, int(minval(layout%width)/(narrow_width*(self%mean_radius + self%margin)), int32))
   end subroutine prepare
 
   !> Allocates empty lists for all disks, with more space for larger disks, which have more
@@ -173,26 +174,26 @@ contains
     self%entry(self%first(:n)) = unlisted
   end subroutine make_room
 
-  !> Divides each cell of a patch into parts x parts empty narrow cells.
-  subroutine cut_cells(self, patch, parts)
+  !> Divides each cell into parts x parts empty narrow cells.
+  subroutine cut_cells(self, layout, parts)
     class(neighbour_lists_t), intent(inout) :: self
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     integer(int32), intent(in) :: parts
     integer(int32) :: n
 
     self%parts = 1
-    if (parts < 2 .or. any(patch%n /= patch%whole .or. patch%first /= 1) .or. maxval(patch%n)*parts > huge(1_int16) - 2) return
+    if (parts < 2 .or. any(layout%n /= layout%whole .or. layout%first /= 1) .or. maxval(layout%n)*parts > huge(1_int16) - 2) return
     self%parts = parts
-    associate (narrow => self%narrow_patch)
-      narrow = patch
-      narrow%whole = parts*patch%whole
+    associate (narrow => self%narrow_layout)
+      narrow = layout
+      narrow%whole = parts*layout%whole
       narrow%n = narrow%whole
-      narrow%width = patch%width/parts
-      call narrow%find_sides(patch%last > 0)
+      narrow%width = layout%width/parts
+      call narrow%find_sides(layout%last > 0)
       self%narrow_extent = 0.5_real32*real(minval(narrow%width), real32)*(1 - 4*epsilon(1.0_real32))
       n = size(self%neighbourhood, kind=int32)
       call self%narrow%empty(narrow%n(1) + 2, narrow%n(2) + 2, n)
-      call self%wide%empty(patch%n(1) + 2, patch%n(2) + 2, n)
+      call self%wide%empty(layout%n(1) + 2, layout%n(2) + 2, n)
     end associate
   end subroutine cut_cells
 
@@ -211,7 +212,7 @@ contains
     integer(int32), intent(in) :: i
     integer(int16) :: cell(2)
 
-    cell = int(self%narrow_patch%cell_at(self%origin + self%extent(:2, i)), int16)
+    cell = int(self%narrow_layout%cell_at(self%origin + self%extent(:2, i)), int16)
   end function narrow_cell
 
   !> Sets up a new neighbourhood around disk i at the position x.
@@ -252,24 +253,24 @@ contains
   end subroutine lay
 
   !> Makes the list of disk i: finds the disks that it can touch in its new neighbourhood.
-  subroutine enter(self, i, cells, patch, cell)
+  subroutine enter(self, i, cells, layout, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     type(cell_contents_t), intent(in) :: cells
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     integer(int16), intent(in) :: cell(2)          !! cell of disk i
 
     self%entry(self%first(i)) = 0
     if (self%parts == 1) then
-      call search(self, i, cells, patch, cell)
+      call search(self, i, cells, layout, cell)
     else if (is_narrow(self, i)) then
       associate (home => narrow_cell(self, i))
-        call search(self, i, self%narrow, self%narrow_patch, home)
-        call search(self, i, self%wide, patch, cell)
+        call search(self, i, self%narrow, self%narrow_layout, home)
+        call search(self, i, self%wide, layout, cell)
         call self%narrow%insert(self%narrow%number(home), i)
       end associate
     else
-      call search(self, i, cells, patch, cell)
+      call search(self, i, cells, layout, cell)
       call self%wide%insert(self%wide%number(cell), i)
     end if
   end subroutine enter
@@ -277,11 +278,11 @@ contains
   !> Searches a cell and its eight neighbours for disks that disk i can touch in its neighbourhood,
   !> and enters each pair in both lists. Pairs with a disk that has no list yet are entered when its
   !> list is made.
-  subroutine search(self, i, cells, patch, cell)
+  subroutine search(self, i, cells, layout, cell)
     type(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     type(cell_contents_t), intent(in) :: cells
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     integer(int16), intent(in) :: cell(2)          !! cell around which disks are searched
     integer(int32) :: candidate(list_capacity), around(9), image(9), c, k, row
     integer(int64) :: n                            ! number of candidates
@@ -290,8 +291,8 @@ contains
     own = self%extent(:, i)
     self%extent(4, i) = -(2*own(4) + 4*own(3))     ! excludes disk i itself from the candidates
     n = 0
-    if (patch%at_seam(cell)) then
-      call find_cells(cells, patch, cell, around, image)
+    if (layout%at_seam(cell)) then
+      call find_cells(cells, layout, cell, around, image)
       do k = 1, size(around)
         call append(cells%cell(around(k)), candidate, n)
         call add_chain(around(k), image(k))
@@ -388,11 +389,11 @@ contains
   end subroutine add_pair
 
   !> Removes disk i from the lists of all other disks.
-  pure subroutine leave(self, i, cells, patch, cell)
+  pure subroutine leave(self, i, cells, layout, cell)
     class(neighbour_lists_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     type(cell_contents_t), intent(in) :: cells
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     integer(int16), intent(in) :: cell(2)          !! cell of disk i
     integer(int32) :: at, k, m, around(9), image(9), j, n
 
@@ -411,7 +412,7 @@ contains
       if (self%entry(self%first(j)) >= 0) call remove(self, j, self%back(at + k))
     end do
     if (n /= incomplete) return
-    call find_cells(cells, patch, cell, around, image)
+    call find_cells(cells, layout, cell, around, image)
     do k = 1, size(around)
       do m = 1, cells%cell(around(k))%in_slots()
         call remove_disk(self, cells%cell(around(k))%slot(m) + 1, i - 1 + image_unit*reverse(image(k)))
@@ -454,16 +455,16 @@ contains
   end subroutine remove_disk
 
   !> Lists a cell and its eight neighbours, with the periodic image to which each belongs.
-  pure subroutine find_cells(cells, patch, cell, around, image)
+  pure subroutine find_cells(cells, layout, cell, around, image)
     type(cell_contents_t), intent(in) :: cells
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     integer(int16), intent(in) :: cell(2)
     integer(int32), intent(out) :: around(9), image(9)
     integer(int32) :: column, row, x, y, k
 
     do k = 0, 8
-      call patch%step(1, int(cell(1), int32), modulo(k, 3) - 1, column, x)
-      call patch%step(2, int(cell(2), int32), k/3 - 1, row, y)
+      call layout%step(1, int(cell(1), int32), modulo(k, 3) - 1, column, x)
+      call layout%step(2, int(cell(2), int32), k/3 - 1, row, y)
       around(k + 1) = column + cells%stride*row
       image(k + 1) = modulo(x + 3*y, 9)
     end do

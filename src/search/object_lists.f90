@@ -7,7 +7,8 @@
 !> of every prediction therefore depends only on the sizes of nearby disks.
 module object_lists
   use kinds, only: int16, int32, real64
-  use cell_faces, only: cell_faces_t, patch_t
+  use cell_faces, only: cell_faces_t
+  use cell_layout, only: cell_layout_t
   use circles, only: new_circle
   use disks, only: disk_t
   use grid, only: cell_lists_t, split_block
@@ -16,10 +17,7 @@ module object_lists
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: largest_small_radius, place_t, object_lists_t
-
-  !> Maximum number of big disks, each of which is tested against all others.
-  integer(int32), parameter :: most_big_disks = 256
+  public :: place_t, object_lists_t
 
   !> A cell into which an obstacle or a big disk reaches.
   type :: place_t
@@ -39,7 +37,7 @@ module object_lists
   type, extends(cell_lists_t) :: object_lists_t
     type(big_disk_t), allocatable :: big(:)
     real(real64) :: margin = 0.0_real64      !! margin around the reference positions of big disks [length]
-    type(patch_t), private :: patch              !! block of cells for which the lists of obstacles were made
+    type(cell_layout_t), private :: layout       !! block of cells for which the lists of obstacles were made
     !> Lower left and upper right corner of the rectangle of all cells of the box [length].
     real(real64), private :: span(2, 2) = 0.0_real64
   contains
@@ -55,70 +53,54 @@ module object_lists
 
 contains
 
-  !> Radius that determines the width of the cells: the maximum of all radii or, if a few disks are
-  !> much bigger, of the radii of the small disks.
-  pure function largest_small_radius(disk) result(radius)
-    type(disk_t), intent(in) :: disk(:)
-    real(real64) :: radius, next
-    integer :: n_bigger
-
-    radius = maxval(disk%radius)
-    do
-      next = maxval(disk%radius, mask=disk%radius <= 0.5_real64*radius)
-      n_bigger = count(disk%radius > next)
-      if (.not. next > 0 .or. n_bigger > most_big_disks .or. 20*n_bigger > size(disk)) exit
-      radius = next
-    end do
-  end function largest_small_radius
-
   !> True if the lists of obstacles were made for the cells of the given block.
-  pure function serves(self, patch, faces) result(yes)
+  pure function serves(self, layout, faces) result(yes)
     class(object_lists_t), intent(in) :: self
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     type(cell_faces_t), intent(in) :: faces
     logical :: yes
 
     yes = allocated(self%entry)
-    if (yes) yes = self%patch%equals(patch) .and. all(abs(span_of(patch, faces) - self%span) <= 0)
+    if (yes) yes = self%layout%equals(layout) .and. all(abs(span_of(layout, faces) - self%span) <= 0)
   end function serves
 
   !> Lower left and upper right corner of the rectangle of all cells of the box.
-  pure function span_of(patch, faces) result(span)
-    type(patch_t), intent(in) :: patch
+  pure function span_of(layout, faces) result(span)
+    type(cell_layout_t), intent(in) :: layout
     type(cell_faces_t), intent(in) :: faces
     real(real64) :: span(2, 2), other(2)           !! [length]
 
-    call faces%rectangle([1, 1], patch%whole, span(:, 1), other)
-    call faces%rectangle(patch%whole, patch%whole, other, span(:, 2))
+    call faces%rectangle([1, 1], layout%whole, span(:, 1), other)
+    call faces%rectangle(layout%whole, layout%whole, other, span(:, 2))
   end function span_of
 
   !> Lists the obstacles and the big disks, which are too large for the cells.
-  subroutine renew(self, sim, patch, faces)
+  subroutine renew(self, sim, layout, faces)
     class(object_lists_t), intent(out) :: self
     type(simulation_t), intent(in) :: sim
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     type(cell_faces_t), intent(in) :: faces
     type(place_t), allocatable :: places(:)
     integer(int32) :: k
 
-    if (sim%box%has_obstacles() .or. any(sim%disk%radius > patch%small)) then
+    if (sim%box%has_obstacles() .or. any(sim%disk%radius > layout%small)) then
       self%margin = 0.5_real64*minval(faces%width)
-      call self%open(patch%n)
-      self%patch = patch
-      self%span = span_of(patch, faces)
+      call self%open(layout%n)
+      self%layout = layout
+      self%span = span_of(layout, faces)
     end if
     do k = 1, sim%box%n_obstacles()
-      call find_places(sim%box%obstacle(k)%shape, 0.0_real64, patch, faces, places)
+      call find_places(sim%box%obstacle(k)%shape, 0.0_real64, layout, faces, places)
       call enter(self, obstacle_code(k), places)
     end do
-    call self%renew_big(sim, patch, faces)
+    call self%renew_big(sim, layout, faces)
   end subroutine renew
 
   !> Renews the lists of big disks after a possible change of the indices of the disks.
-  subroutine renew_big(self, sim, patch, faces)
+  subroutine renew_big(self, sim, layout, faces)
     class(object_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     type(cell_faces_t), intent(in) :: faces
     integer(int32) :: i, k
 
@@ -129,13 +111,13 @@ contains
       deallocate (self%big)
     end if
     associate (disks => pack([(i, i=1, sim%n_disks())], &
-      [(sim%disk(i)%radius > patch%small .and. sim%is_inside(i), i=1, sim%n_disks())]))
+      [(sim%disk(i)%radius > layout%small .and. sim%is_inside(i), i=1, sim%n_disks())]))
       allocate (self%big(size(disks)))
       self%big%disk = disks
     end associate
     do k = 1, size(self%big, kind=int32)
       allocate (self%big(k)%rim(0))
-      call self%follow(sim, k, patch, faces)
+      call self%follow(sim, k, layout, faces)
     end do
   end subroutine renew_big
 
@@ -184,17 +166,17 @@ contains
 
   !> Makes the present position of big disk k its reference position, and renews its entries in the
   !> lists.
-  subroutine follow(self, sim, k, patch, faces)
+  subroutine follow(self, sim, k, layout, faces)
     class(object_lists_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: k
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     type(cell_faces_t), intent(in) :: faces
 
     associate (big => self%big(k))
       call leave(self, big%disk, big%rim)
       big%centre = sim%position(big%disk)
-      call find_places(new_circle(big%centre, sim%disk(big%disk)%radius, .false.), self%margin, patch, faces, big%rim)
+      call find_places(new_circle(big%centre, sim%disk(big%disk)%radius, .false.), self%margin, layout, faces, big%rim)
       big%obstacles = obstacles_along(self, big%rim)
       call enter(self, big%disk, big%rim)
     end associate
@@ -222,24 +204,24 @@ contains
 
   !> Finds the cells in which a small disk may touch the outline of a shape displaced by up to
   !> `margin`.
-  subroutine find_places(shape, margin, patch, faces, places)
+  subroutine find_places(shape, margin, layout, faces, places)
     class(shape_t), intent(in) :: shape
     real(real64), intent(in) :: margin             !! [length]
-    type(patch_t), intent(in) :: patch
+    type(cell_layout_t), intent(in) :: layout
     type(cell_faces_t), intent(in) :: faces
     type(place_t), allocatable, intent(out) :: places(:)
     real(real64) :: middle(2), room(2)
     integer(int32) :: low(2), high(2), n
 
-    middle = shape%middle - patch%lower
-    room = (0.5_real64*(faces%width + faces%overlap) + shape%extent + patch%small + margin)*(1 + spare)
+    middle = shape%middle - layout%lower
+    room = (0.5_real64*(faces%width + faces%overlap) + shape%extent + layout%small + margin)*(1 + spare)
     low = ceiling((middle - room)/faces%width + 0.5_real64)
     high = floor((middle + room)/faces%width + 0.5_real64)
     if (shape%encloses) low = 1
-    if (shape%encloses) high = patch%whole
+    if (shape%encloses) high = layout%whole
     where (.not. faces%periodic)
-      low = min(max(low, 1), patch%whole)
-      high = min(max(high, 1), patch%whole)
+      low = min(max(low, 1), layout%whole)
+      high = min(max(high, 1), layout%whole)
     end where
     allocate (places(32))
     n = 0
@@ -256,22 +238,22 @@ contains
       real(real64) :: lower(2), upper(2), beyond(2), half(2), d(2)
       integer(int32) :: cell(2), last(2), first(2)
 
-      call faces%rectangle(low, patch%whole, lower, beyond)
-      call faces%rectangle(high, patch%whole, beyond, upper)
+      call faces%rectangle(low, layout%whole, lower, beyond)
+      call faces%rectangle(high, layout%whole, beyond, upper)
       half = 0.5_real64*(upper - lower)*(1 + spare) + margin
       d = 0.5_real64*(lower + upper) - middle
-      if (.not. shape%reaches(d, half, patch%small) .or. shape%covers(d, half, 0.0_real64)) return
+      if (.not. shape%reaches(d, half, layout%small) .or. shape%covers(d, half, 0.0_real64)) return
       if (any(high > low)) then
         call split_block(low, high, last, first)
         call search_block(low, last)
         call search_block(first, high)
         return
       end if
-      cell = modulo(low - patch%first, patch%whole) + 1
-      if (any(cell > patch%n)) return
+      cell = modulo(low - layout%first, layout%whole) + 1
+      if (any(cell > layout%n)) return
       if (n == size(places)) places = [places, places]
       n = n + 1
-      places(n) = place_t(cell, -floor(real(low - 1, real64)/patch%whole))
+      places(n) = place_t(cell, -floor(real(low - 1, real64)/layout%whole))
     end subroutine search_block
   end subroutine find_places
 

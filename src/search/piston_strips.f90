@@ -25,13 +25,13 @@ contains
     high = 1 - modulo(k, 2)
     allocate (disks(64))
     n = 0
-    do across = 1, self%patch%n(axis)
+    do across = 1, self%layout%n(axis)
       if (axis == 1) then
         if (.not. self%faces%column(high, across)%struck) cycle
       else
         if (.not. self%faces%row(high, across)%struck) cycle
       end if
-      do along = 1, self%patch%n(3 - axis)
+      do along = 1, self%layout%n(3 - axis)
         c = self%cells%number(int(merge([across, along], [along, across], axis == 1), int16))
         do m = 1, self%cells%cell(c)%in_slots()
           call add(self%cells%cell(c)%slot(m) + 1)
@@ -77,14 +77,14 @@ contains
     do k = 1, n_sides
       if (pushed(k)) disks = [disks, near_piston(self, k)]
     end do
-    call self%faces%find_strips(sim%box, self%patch%small, now)
+    call self%faces%find_strips(sim%box, self%layout%small, now)
     do k = 1, n_sides
       if (pushed(k)) disks = [disks, near_piston(self, k)]
     end do
     if (.not. self%lists%used) return
     do i = 1, size(disks, kind=int32)
       associate (region => self%lists%neighbourhood(disks(i)), cell => sim%tag(disks(i))%cell)
-        if (sim%disk(disks(i))%radius > self%patch%small) cycle
+        if (sim%disk(disks(i))%radius > self%layout%small) cycle
         region%column%struck = self%faces%column(:, cell(1))%struck
         region%row%struck = self%faces%row(:, cell(2))%struck
       end associate
