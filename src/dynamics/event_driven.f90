@@ -17,7 +17,7 @@ module event_driven
   use event_log, only: event_log_t, is_full
   use event_queue, only: event_queue_t
   use evolution, only: evolution_t, limits_t
-  use neighbour_search, only: event_t
+  use event_prediction, only: event_t
   use partners, only: axis_of, is_side, is_wall, nothing
   use piston_strips, only: change_strips, near_piston
   use simulation_state, only: simulation_t

@@ -4,7 +4,7 @@
 module event_heap
   use kinds, only: int32
   use disks, only: tag_t
-  use neighbour_search, only: event_t, wins
+  use event_prediction, only: event_t, wins
   implicit none
   private
   public :: event_heap_t, need_order, precedes
@@ -28,7 +28,7 @@ module event_heap
 contains
 
   !> True if event a precedes event b. Events are ordered by time; simultaneous events by
-  !> `neighbour_search: wins`. If both disks of a pair have stored their collision, the two events
+  !> `event_prediction: wins`. If both disks of a pair have stored their collision, the two events
   !> have the same rank.
   pure function precedes(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b

@@ -11,7 +11,7 @@ module event_queue
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none
   use disks, only: disk_t, tag_t
   use event_heap, only: event_heap_t, need_order, precedes
-  use neighbour_search, only: event_of, event_t
+  use event_prediction, only: event_of, event_t
   implicit none
   private
   public :: event_queue_t

@@ -1,6 +1,6 @@
 !> Kinematics of free flight: the position of a disk after a given time, and the time until it
 !> touches a line or a circle. Times are measured from the given state of the disk. Disk-disk
-!> contacts are in `neighbour_search`.
+!> contacts are in `event_prediction`.
 module free_flight
   use kinds, only: never, real64
   implicit none

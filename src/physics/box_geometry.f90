@@ -370,7 +370,7 @@ contains
 
   !> True if a point on a straight path certainly stays outside a circle about the origin for a
   !> given time. The radius is enlarged by a margin that exceeds all rounding errors. A contact
-  !> before the time s requires c < -2 b s, as in `neighbour_search: earliest_contact`. If the
+  !> before the time s requires c < -2 b s, as in `event_prediction: earliest_contact`. If the
   !> circle is the obstacle itself, a point moving away from its centre cannot touch it.
   pure function passes_by(d, v, s, rho, is_round) result(yes)
     real(real64), intent(in) :: d(2)            !! initial position [length]

@@ -5,7 +5,7 @@ module cell_contents
   use kinds, only: int16, int32, int64
   use disks, only: disk_t, tag_t
   use memory_hints, only: prefetch
-  use neighbour_search, only: list_capacity
+  use event_prediction, only: list_capacity
   implicit none
   private
   public :: append, cell_capacity, cell_contents_t, gather

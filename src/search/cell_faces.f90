@@ -10,7 +10,7 @@ module cell_faces
   use cell_layout, only: cell_layout_t
   use disks, only: disk_t
   use free_flight, only: flight, flight_velocity, slowest, time_to_line
-  use neighbour_search, only: prediction_t
+  use event_prediction, only: prediction_t
   use partners, only: crossing, is_wall, n_sides, nothing, sense_of, side_crossed
   use shapes, only: spare
   implicit none

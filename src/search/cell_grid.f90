@@ -13,7 +13,7 @@ module cell_grid
   use free_flight, only: time_to_circle
   use images, only: images_t
   use neighbour_lists, only: neighbour_lists_t
-  use neighbour_search, only: earliest_contact, latest_clock, no_gravity, prediction_t
+  use event_prediction, only: earliest_contact, latest_clock, no_gravity, prediction_t
   use partners, only: axis_of, is_wall, looks_again, nothing, sense_of, side_crossed
   use object_lists, only: place_t, object_lists_t
   use simulation_state, only: simulation_t

@@ -7,7 +7,7 @@ module cell_scans
   use cell_layout, only: cell_layout_t
   use images, only: image_t, images_t
   use neighbour_lists, only: neighbour_lists_t
-  use neighbour_search, only: earliest_contact, latest_clock, list_capacity, no_gravity, prediction_t
+  use event_prediction, only: earliest_contact, latest_clock, list_capacity, no_gravity, prediction_t
   use grid, only: entry_t
   use object_lists, only: object_lists_t, place_t
   use simulation_state, only: simulation_t

@@ -24,7 +24,7 @@ module neighbour_lists
   use cell_layout, only: cell_layout_t
   use disks, only: disk_t, tag_t
   use memory_hints, only: prefetch
-  use neighbour_search, only: list_capacity, prediction_t
+  use event_prediction, only: list_capacity, prediction_t
   use partners, only: is_wall, looks_again
   implicit none
   private

@@ -10,7 +10,7 @@ module test_systems
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
   use initial_state, only: create_simulation
-  use neighbour_search, only: earliest_contact, prediction_t, no_gravity
+  use event_prediction, only: earliest_contact, prediction_t, no_gravity
   use partners, only: n_sides
   use random_stream, only: random_stream_t
   use run_input, only: input_from_text

@@ -1,6 +1,6 @@
 !> Predicted events, and the procedure `earliest_contact`, by which all search methods predict
 !> disk-disk contacts.
-module neighbour_search
+module event_prediction
   use images, only: image_t
   use kinds, only: int32, never, real64
   use disks, only: disk_t, tag_t
@@ -190,4 +190,4 @@ contains
     end function ids_of
   end function wins
 
-end module neighbour_search
+end module event_prediction
