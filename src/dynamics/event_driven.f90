@@ -6,11 +6,12 @@
 !> are not searched for. When a stale event is due, it is recognised by the changed collision
 !> counter of the partner, and the next event of the disk is predicted instead.
 module event_driven
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int16, int32, int64, never, real64
   use box_sides, only: side_time
   use collapses, only: still, watch
   use calendar, only: most_coming, stages
   use cell_grid, only: cell_grid_t
+  use disks, only: disk_t, tag_t
   use encounters, only: depart, encounter_text, execute_collision, is_passage, need_general, pass_side
   use epochs, only: begin_first_epoch, last_time
   use errors, only: error_t, exit_broken, fail
@@ -22,7 +23,6 @@ module event_driven
   use piston_strips, only: change_strips, near_piston
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
-  use histories, only: histories_t
   implicit none
   private
   public :: event_driven_t
@@ -49,7 +49,6 @@ module event_driven
     !> Whether a disk has left the box since the start of `advance`.
     logical :: has_departed = .false.
     logical :: is_part = .false.  !! whether this engine advances one domain of a parallel run
-    class(histories_t), allocatable :: histories   !! motion of the disks in the domain
     integer(int64) :: last_count = 0               !! total number of events at which `run_events` returns
   contains
     procedure :: start
@@ -57,6 +56,11 @@ module event_driven
     procedure :: renew
     procedure, private :: run_events
     procedure, private :: predict_all
+    ! Called only if `is_part`:
+    procedure :: counts
+    procedure :: record_collision
+    procedure :: record_cell
+    procedure :: read_records_ahead
   end type event_driven_t
 
 contains
@@ -211,7 +215,7 @@ contains
       do stage = 1, stages
         call self%queue%list_coming(sim%tag, stage, n, disks)
         call self%search%read_ahead(sim%disk, sim%tag, stage, disks(:n))
-        if (self%is_part .and. stage == 2) call self%histories%read_ahead(sim%disk, disks(:n))
+        if (self%is_part .and. stage == 2) call self%read_records_ahead(sim%disk, disks(:n))
       end do
       self%last_count = min(self%last_count, sim%tally%events + events_ahead)
     end subroutine read_ahead
@@ -255,7 +259,7 @@ contains
     real(real64) :: s      ! time since the later of the previous events of both disks [time]
 
     counts = .true.
-    if (self%is_part) counts = self%histories%counts(sim%tag, i, code)
+    if (self%is_part) counts = self%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%collision_counter == sim%tag(i)%partner_counter) then
         if (self%general == if_clocks_are_equal) then
@@ -274,7 +278,7 @@ contains
         call execute_collision(sim, i, code, t, counts, is_general, log)
         call self%queue%drop_if_next(code)
         call self%search%predict_both(sim, i, code)
-        if (self%is_part) call self%histories%record_collision(sim%disk, sim%tag, i, code)
+        if (self%is_part) call self%record_collision(sim%disk, sim%tag, i, code)
         call self%queue%schedule(sim%disk, sim%tag, code)
         call self%queue%schedule(sim%disk, sim%tag, i)
         return
@@ -293,7 +297,7 @@ contains
         call pass_side(sim, i, code, t)
       end if
       call self%search%cross(sim, i, code)
-      if (self%is_part) call self%histories%record_cell(sim%tag(i)%cell, i)
+      if (self%is_part) call self%record_cell(sim%tag(i)%cell, i)
       call self%queue%schedule(sim%disk, sim%tag, i)
       return
     end if
@@ -388,5 +392,38 @@ contains
       if (sim%is_inside(i)) call predict(self, sim, i)
     end do
   end subroutine predict_all
+
+  !> True if this engine counts and logs the collision of disk i with a partner. In a parallel run,
+  !> one of the domains does.
+  pure function counts(self, tag, i, code) result(yes)
+    class(event_driven_t), intent(in) :: self
+    type(tag_t), intent(in) :: tag(:)
+    integer(int32), intent(in) :: i, code     !! index of the disk, and code of its partner (see `partners`)
+    logical :: yes
+
+    yes = .true.
+  end function counts
+
+  !> Records a collision of disks i and j, and the cells that contain the two disks.
+  subroutine record_collision(self, disk, tag, i, j)
+    class(event_driven_t), intent(inout) :: self
+    type(disk_t), intent(in) :: disk(:)
+    type(tag_t), intent(in) :: tag(:)
+    integer(int32), intent(in) :: i, j
+  end subroutine record_collision
+
+  !> Records the cell of disk i.
+  subroutine record_cell(self, cell, i)
+    class(event_driven_t), intent(inout) :: self
+    integer(int16), intent(in) :: cell(2)
+    integer(int32), intent(in) :: i
+  end subroutine record_cell
+
+  !> Prefetches the records of some disks and of their partners.
+  subroutine read_records_ahead(self, disk, disks)
+    class(event_driven_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk(:)
+    integer(int32), intent(in) :: disks(:)
+  end subroutine read_records_ahead
 
 end module event_driven

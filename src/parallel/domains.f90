@@ -8,7 +8,7 @@ module domains
   use cell_layout, only: cell_layout_t
   use disks, only: disk_t, tag_t, whole_disk_t
   use errors, only: error_t
-  use event_driven, only: event_driven_t
+  use domain_engine, only: domain_engine_t
   use event_log, only: event_log_t
   use evolution, only: limits_t
   use partners, only: nothing
@@ -47,7 +47,7 @@ module domains
     !> Owned disks and ghosts, with some vacant array elements (slots). The time origin is that of
     !> the whole simulation.
     type(simulation_t) :: sim
-    type(event_driven_t) :: engine
+    type(domain_engine_t) :: engine
     !> Index of each disk in the whole simulation. The elements of vacant slots form a linked list.
     integer(int32), allocatable :: global_index(:)
     integer(int32) :: vacant = 0                   !! index of the first vacant slot; 0 if there is none
@@ -102,7 +102,7 @@ contains
       if (.not. allocated(self%sim%species)) then
         self%sim%specification_t = sim%specification_t
         self%sim%epoch_end = forever
-        allocate (self%engine%search, self%engine%histories)
+        allocate (self%engine%search)
         self%engine%is_part = .true.
       end if
       slots = n + n/spare + spare_at_least
