@@ -295,7 +295,7 @@ contains
       if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%serial_events)
       if (sim%tally%series(1) > 0) text = text//eol//"simultaneous_collisions = "//written(sim%tally%simultaneous)// &
         eol//"longest_series = "//written(sim%tally%series(1))//" collisions of "//written(sim%tally%series(2))//" disks"
-      if (allocated(sim%drive)) text = text//eol//"kicks = "//written(sim%kicks)// &
+      if (allocated(sim%drive)) text = text//eol//"kicks = "//written(sim%n_kicks)// &
         eol//"drive_energy = "//written(sim%tally%total(drive_energy))
       if (allocated(sim%drive_count)) text = text//eol//sim%kick_counter()//" = "//written(sum(sim%drive_count))
     end associate

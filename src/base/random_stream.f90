@@ -13,7 +13,7 @@ module random_stream
   public :: key_of_draws, random_stream_t
 
   !> Purposes of random numbers during a run. The initial state uses other streams.
-  integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5, recycled_disks = 6, entering_disks = 7
+  integer, parameter, public :: thermal_walls = 3, kicked_disks = 4, orientations = 5, recycled_disks = 6, entering_disks = 7
 
   real(real64), parameter :: unit_53 = 2.0_real64**(-53)
 

@@ -15,7 +15,7 @@ module variable_rows
   !> simulation is running. Variables that do not affect the trajectory may change on `--resume`. A
   !> running simulation accepts changes of variables that affect the motion of the disks, but not of
   !> their number, properties or initial state.
-  character(len=9), parameter, public :: never = "never", on_resume = "on resume", in_motion = "running"
+  character(len=9), parameter, public :: at_no_time = "never", on_resume = "on resume", in_motion = "running"
 
   type, public :: range_t
     real(real64) :: lower, upper             !! smallest and largest allowed value
@@ -65,7 +65,8 @@ module variable_rows
     character(len=60) :: goes_with = ""
     !> Names of variables of the same group, separated by blanks, that exclude this variable.
     character(len=80) :: excludes = ""
-    character(len=9) :: may_change = never   !! when the value may change: `never`, `on_resume` or `in_motion`
+    !> When the value may change: `at_no_time`, `on_resume` or `in_motion`.
+    character(len=9) :: may_change = at_no_time
     character(len=100) :: otherwise = ""     !! description of a default that is not a constant
   end type variable_t
 

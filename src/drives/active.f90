@@ -92,7 +92,7 @@ contains
 
     do i = 1, sim%n_disks()
       if (.not. self%acts_on(sim%tag(i)%species)) cycle
-      call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
+      call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%n_kicks)
       call stream%draw_uniform(u)
       sim%extra(i)%angle = 2*pi*u
     end do
@@ -109,7 +109,7 @@ contains
     real(real64) :: z(2)
 
     associate (angle => sim%extra(i)%angle)
-      call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
+      call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%n_kicks)
       call stream%draw_normals(z)
       angle = angle + self%turning_rate*self%interval + sqrt(2*self%rotational_diffusion*self%interval)*z(1)
       v = v + self%speed*[cos(angle), sin(angle)]

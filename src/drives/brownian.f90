@@ -5,7 +5,7 @@ module brownian
   use box_geometry, only: box_t
   use fields, only: fields_t
   use kicks, only: change_spin, change_velocity, interrupt_disk
-  use random_stream, only: draws_of_kicks => kicks, key_of_draws, random_stream_t
+  use random_stream, only: kicked_disks, key_of_draws, random_stream_t
   use simulation_state, only: drive_t, simulation_t
   use variable_rows, only: choice_t
   implicit none
@@ -63,12 +63,12 @@ contains
     integer(int32) :: i, n
     logical :: is_hit
 
-    key = key_of_draws(sim%seed, draws_of_kicks)
+    key = key_of_draws(sim%seed, kicked_disks)
     allocate (kicked(sim%n_disks()))
     n = 0
     do i = 1, sim%n_disks()
       if (.not. (self%acts_on(sim%tag(i)%species) .and. sim%is_inside(i))) cycle
-      call stream%seed_disk(key, sim%tag(i)%id, sim%kicks)
+      call stream%seed_disk(key, sim%tag(i)%id, sim%n_kicks)
       call self%draw_hit(stream, is_hit)
       if (.not. is_hit) cycle
       call interrupt_disk(sim, i)

@@ -6,7 +6,7 @@ module noise
   use exact_sums, only: exact_sum_t
   use fields, only: fields_t
   use kicks, only: change_velocity, interrupt_disk
-  use random_stream, only: draws_of_kicks => kicks, key_of_draws, random_stream_t
+  use random_stream, only: kicked_disks, key_of_draws, random_stream_t
   use simulation_state, only: drive_t, simulation_t
   use variable_rows, only: choice_t, in_motion, positive, variable_t
   implicit none
@@ -75,13 +75,13 @@ contains
     integer(int32) :: i, n
 
     scale = sqrt(self%strength*self%interval)
-    key = key_of_draws(sim%seed, draws_of_kicks)
+    key = key_of_draws(sim%seed, kicked_disks)
     n = sim%n_disks()
     allocate (kicked(n), draws(2, merge(n, 0_int32, self%keep_momentum)))
     n = 0
     do i = 1, sim%n_disks()
       if (.not. (self%acts_on(sim%tag(i)%species) .and. sim%is_inside(i))) cycle
-      call stream%seed_disk(key, sim%tag(i)%id, sim%kicks)
+      call stream%seed_disk(key, sim%tag(i)%id, sim%n_kicks)
       call interrupt_disk(sim, i)
       call stream%draw_normals(z)
       call change_velocity(sim, i, sim%disk(i)%v + scale*z)

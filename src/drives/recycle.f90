@@ -185,7 +185,7 @@ contains
     key = key_of_draws(sim%seed, recycled_disks)
     do k = 1, size(due, kind=int32)
       associate (i => due(k))
-        call stream%seed_disk(key, sim%tag(i)%id, sim%kicks)
+        call stream%seed_disk(key, sim%tag(i)%id, sim%n_kicks)
         call find_position(self%to_region, sim, packing, sim%disk(i)%radius, stream, x, free)
         if (.not. free) cycle
         call move_disk(self, sim, i, x, stream)

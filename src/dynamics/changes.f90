@@ -101,12 +101,12 @@ contains
     !> of the run. This number determines the time and the random numbers of the next kick.
     subroutine count_kicks()
       if (.not. allocated(sim%drive)) return
-      sim%kicks = int(min(sim%time()/sim%drive%interval, 2.0_real64**62), int64)
-      do while (sim%kick_time(sim%kicks + 1) <= sim%time())
-        sim%kicks = sim%kicks + 1
+      sim%n_kicks = int(min(sim%time()/sim%drive%interval, 2.0_real64**62), int64)
+      do while (sim%kick_time(sim%n_kicks + 1) <= sim%time())
+        sim%n_kicks = sim%n_kicks + 1
       end do
-      do while (sim%kick_time(sim%kicks) > sim%time())
-        sim%kicks = sim%kicks - 1
+      do while (sim%kick_time(sim%n_kicks) > sim%time())
+        sim%n_kicks = sim%n_kicks - 1
       end do
     end subroutine count_kicks
   end subroutine change_system

@@ -122,7 +122,7 @@ contains
     last = never
     ! The time of the kick may have been rounded up (see `timeline: advance_once`).
     if (allocated(sim%drive)) then
-      if (sim%drive%acts_on_all()) last = nearest(sim%kick_time(sim%kicks + 1) - sim%box%epoch, 1.0_real64)
+      if (sim%drive%acts_on_all()) last = nearest(sim%kick_time(sim%n_kicks + 1) - sim%box%epoch, 1.0_real64)
     end if
     last = max(last, minval(sim%disk%event_time))
     do i = 1, n

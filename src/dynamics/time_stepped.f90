@@ -14,7 +14,7 @@ module time_stepped
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
-  use free_flight, only: flight, slowest
+  use free_flight, only: flight, negligible_speed
   use verlet_list, only: verlet_list_t
   use partners, only: axis_of, n_sides, nothing, sense_of
   use signals, only: stop_requested
@@ -134,7 +134,7 @@ contains
     yes = .not. (sim%box%has_gravity() .or. any(sim%box%side%moves()))
     do i = 1, sim%n_disks()
       if (.not. yes) return
-      yes = .not. any(abs(sim%disk(i)%v) > slowest)
+      yes = .not. any(abs(sim%disk(i)%v) > negligible_speed)
     end do
   end function at_rest
 

@@ -94,7 +94,7 @@ contains
       call continue_with(kicked, .true.)
     end do
     do while (arrived .and. sim%time() >= kick_time .and. next_kick(evolution, sim) <= kick_time)
-      sim%kicks = sim%kicks + 1
+      sim%n_kicks = sim%n_kicks + 1
       call sim%drive%kick(sim, kicked)
       call continue_with(kicked, sim%drive%moves_disks())
     end do
@@ -208,7 +208,7 @@ contains
     if (.not. changed) return
     ! `change_system` has counted the kicks up to the present time
     do while (has_kicked(evolution, sim) .and. .not. kicked)
-      sim%kicks = sim%kicks - 1
+      sim%n_kicks = sim%n_kicks - 1
     end do
     call evolution%start(sim)
   end subroutine make_changes
@@ -219,8 +219,8 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = allocated(sim%drive) .and. sim%kicks > 0
-    if (yes) yes = evolution%pause_at(sim%kick_time(sim%kicks)) >= sim%time()
+    yes = allocated(sim%drive) .and. sim%n_kicks > 0
+    if (yes) yes = evolution%pause_at(sim%kick_time(sim%n_kicks)) >= sim%time()
   end function has_kicked
 
   !> Time of the next scheduled change, entry or kick.
@@ -283,7 +283,7 @@ contains
     type(simulation_t), intent(in) :: sim
     real(real64) :: t                              !! time since the start of the run; `never` without kicks
 
-    t = evolution%pause_at(sim%kick_time(sim%kicks + 1))
+    t = evolution%pause_at(sim%kick_time(sim%n_kicks + 1))
     if (evolution%idle .and. allocated(sim%drive)) then
       if (.not. sim%drive%can_act(sim)) t = never
     end if

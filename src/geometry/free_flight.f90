@@ -5,10 +5,10 @@ module free_flight
   use kinds, only: never, real64
   implicit none
   private
-  public :: flight, flight_velocity, time_to_line, time_to_circle, later_time_to_circle, slowest
+  public :: flight, flight_velocity, time_to_line, time_to_circle, later_time_to_circle, negligible_speed
 
   !> Maximum speed that is treated as zero, because contact times would overflow [length/time].
-  real(real64), parameter :: slowest = 1/never
+  real(real64), parameter :: negligible_speed = 1/never
 
   !> Relative safety margin of tests that rule out contacts; larger than all rounding errors. Such a
   !> test never rules out a contact that occurs, but may fail to rule out a contact that does not
@@ -56,7 +56,7 @@ contains
       else
         s = (root - speed)/acceleration
       end if
-    else if (speed > slowest) then
+    else if (speed > negligible_speed) then
       if (acceleration < 0) then
         root = speed**2 + 2*acceleration*distance
         if (root >= 0) s = 2*distance/(speed + sqrt(root))

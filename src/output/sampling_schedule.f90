@@ -88,7 +88,7 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = self%count == 0 .or. sim%time() > self%last_time .or. sim%tally%events + sim%kicks /= self%last_events
+    yes = self%count == 0 .or. sim%time() > self%last_time .or. sim%tally%events + sim%n_kicks /= self%last_events
   end function is_new
 
   !> Records that the present state has been sampled, and determines when the next samples are due.
@@ -98,7 +98,7 @@ contains
 
     self%count = self%count + 1
     self%last_time = sim%time()
-    self%last_events = sim%tally%events + sim%kicks
+    self%last_events = sim%tally%events + sim%n_kicks
     call self%look_ahead(sim)
   end subroutine take
 

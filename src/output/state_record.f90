@@ -45,7 +45,7 @@ contains
     call record%exchange(file, sim%start_energy)
     call record%exchange(file, sim%reference_energy)
     call record%exchange(file, sim%typical_speed2)
-    call record%exchange(file, sim%kicks)
+    call record%exchange(file, sim%n_kicks)
     if (allocated(sim%drive_count)) call record%exchange(file, sim%drive_count)
     call record%exchange(file, sim%changes)
     call exchange_tally(file, record, sim)

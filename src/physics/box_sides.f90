@@ -13,7 +13,7 @@ module box_sides
 
   !> Rounding error of the gap between a disk and a moving side, relative to the magnitude of the
   !> coordinates.
-  real(real64), parameter :: rounding = 16*epsilon(1.0_real64)
+  real(real64), parameter :: relative_error = 16*epsilon(1.0_real64)
 
 contains
 
@@ -169,7 +169,7 @@ contains
     real(real64), intent(in) :: reach           !! maximum displacement of the side [length]
     real(real64) :: gap                         !! [length]
 
-    gap = rounding*(abs(disk%x(axis)) + disk%radius + reach)
+    gap = relative_error*(abs(disk%x(axis)) + disk%radius + reach)
   end function gap_rounding_error
 
 end module box_sides

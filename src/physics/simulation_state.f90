@@ -95,7 +95,7 @@ module simulation_state
     !> Time up to which each source has let disks enter, since the start of the run; allocated
     !> together with `waits` [time].
     real(real64), allocatable :: source_time(:)
-    integer(int64) :: kicks = 0                   !! number of kicks since the start of the run
+    integer(int64) :: n_kicks = 0                 !! number of kicks since the start of the run
     integer(int64) :: changes = 0      !! number of changes since the start of the run; see `changes`
     type(change_t), allocatable :: schedule(:)   !! scheduled changes, including those made
     integer(int64) :: changes_made = 0            !! number of scheduled changes made
@@ -148,7 +148,7 @@ module simulation_state
       class(fields_t), intent(inout) :: fields
     end subroutine read_drive
 
-    !> Applies kick number `sim%kicks` at the present time, and lists the affected disks.
+    !> Applies kick number `sim%n_kicks` at the present time, and lists the affected disks.
     subroutine kick(self, sim, kicked)
       import :: drive_t, int32, simulation_t
       class(drive_t), intent(in) :: self

@@ -9,7 +9,7 @@ module cell_faces
   use box_sides, only: side_time
   use cell_layout, only: cell_layout_t
   use disks, only: disk_t
-  use free_flight, only: flight, flight_velocity, slowest, time_to_line
+  use free_flight, only: flight, flight_velocity, negligible_speed, time_to_line
   use event_prediction, only: prediction_t
   use partners, only: crossing, is_wall, n_sides, nothing, sense_of, side_crossed
   use shapes, only: spare
@@ -291,9 +291,9 @@ contains
 
     speed = abs(disk%v(axis))
     t = ((line%place + line%inset*disk%radius) - disk%x(axis))/ &
-      sign(merge(speed, slowest, speed > slowest), disk%v(axis))
+      sign(merge(speed, negligible_speed, speed > negligible_speed), disk%v(axis))
     t = disk%clock + merge(t, 0.0_real64, t > 0)
-    t = merge(t, never, speed > slowest)
+    t = merge(t, never, speed > negligible_speed)
   end function line_time
 
   !> Version of `next_within` for parabolic paths and for boxes with moving sides.

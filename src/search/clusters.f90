@@ -21,10 +21,10 @@ module clusters
   integer(int32), parameter :: most_disks = 40       !! maximum number of disks in a cluster
   !> A series of collisions is considered unbounded in two cases. Either the number of collisions,
   !> divided by the square of the number of colliding disks, exceeds `longest` (`longest_rough` for
-  !> rough disks), or the closing velocities have decreased by the factor `slowest`. Finite series
-  !> are shorter and slow down less, except within about 1 % of a limit of collapse.
+  !> rough disks), or the closing velocities have decreased by the factor `negligible_ratio`. Finite
+  !> series are shorter and slow down less, except within about 1 % of a limit of collapse.
   integer, parameter :: longest = 24, longest_rough = 240
-  real(real64), parameter :: slowest = 1.0e-200_real64
+  real(real64), parameter :: negligible_ratio = 1.0e-200_real64
   !> Maximum angle between the contact normals of a row of disks that is straight except for
   !> rounding errors. The rounding errors must not end the collapse of the row.
   real(real64), parameter :: straight = 2.0_real64**(-33)
@@ -89,7 +89,7 @@ contains
     duration = 0
     events = 0
     last = 0
-    slow = slowest*maxval(abs(self%contact%closing))
+    slow = negligible_ratio*maxval(abs(self%contact%closing))
     most = merge(longest_rough, longest, any(self%contact%tangential%is_rough()))
     step = 0
     do while (step < most*max(count(events > 0), 2)**2)

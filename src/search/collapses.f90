@@ -163,7 +163,7 @@ contains
 
     call find_members(sim, i, j, t, member, cluster%n)
     call list_contacts(sim, t, member(:cluster%n), cluster)
-    limit = sim%kick_time(sim%kicks + 1) - sim%box%epoch - t     ! a kick ends a series
+    limit = sim%kick_time(sim%n_kicks + 1) - sim%box%epoch - t   ! a kick ends a series
     call cluster%follow(limit, endless, duration, events)
     if (endless) then
       sim%tally%collapse = sim%box%epoch + t + duration

@@ -67,10 +67,10 @@ module neighbour_lists
     real(real64) :: margin = 0.0_real64
     real(real64) :: origin(2) = 0.0_real64         !! lower left corner of the box [length]
     real(real64) :: period(2) = 0.0_real64         !! edges of the box [length]
-    real(real32) :: rounding = 0.0_real32          !! upper bound of the rounding errors in `extent` [length]
+    real(real32) :: rounding_error = 0.0_real32    !! upper bound of the rounding errors in `extent` [length]
     type(neighbourhood_t), allocatable :: neighbourhood(:)   !! neighbourhood of each disk
-    !> For each disk: x and y of the centre relative to `origin`, radius plus `rounding`, and half
-    !> the width of the neighbourhood before clipping; shape (4, disks) [length].
+    !> For each disk: x and y of the centre relative to `origin`, radius plus `rounding_error`, and
+    !> half the width of the neighbourhood before clipping; shape (4, disks) [length].
     real(real32), allocatable :: extent(:, :)
     !> Position in `entry` of the list of each disk; shape (disks+1). A list starts with the number
     !> of its entries.
@@ -153,7 +153,7 @@ contains
     n = size(disk, kind=int32)
     self%origin = lower
     self%period = edges
-    self%rounding = real(8*epsilon(1.0_real32)*maxval(edges) + 1.0e-6_real64*maxval(disk%radius), real32)
+    self%rounding_error = real(8*epsilon(1.0_real32)*maxval(edges) + 1.0e-6_real64*maxval(disk%radius), real32)
     if (allocated(self%first)) then
       if (size(self%first) /= n + 1) deallocate (self%first, self%neighbourhood, self%extent)
     end if
@@ -226,7 +226,7 @@ contains
 
     margin = self%margin*sqrt(self%mean_radius/radius)
     self%extent(:, i) = real([x - self%origin, radius, margin], real32)
-    self%extent(3, i) = self%extent(3, i) + self%rounding
+    self%extent(3, i) = self%extent(3, i) + self%rounding_error
     self%neighbourhood(i)%column = clipped(faces%column(:, cell(1)), 1)
     self%neighbourhood(i)%row = clipped(faces%row(:, cell(2)), 2)
   contains

@@ -13,7 +13,7 @@ module initial_positions
   use box_sides, only: centre_range
   use disks, only: disks_before
   use group_fields, only: group_fields_t
-  use input_fit, only: report_file_problem, rounding
+  use input_fit, only: report_file_problem, touching_tolerance
   use input_groups, only: group_t
   use input_problems, only: problem_list_t
   use packing, only: packing_t
@@ -314,7 +314,7 @@ contains
         min(max(minval(x, dim=2), lower), upper), max(min(maxval(x, dim=2), upper), lower))
       do k = 1, species(s)%count
         if (min(outside, overlapping) >= most_reports) return
-        slack = rounding*(radius(k) + maxval(species%radius))
+        slack = touching_tolerance*(radius(k) + maxval(species%radius))
         call centre_range(region, packing%box, radius(k), lower, upper)
         if (any(x(:, k) < lower - slack .or. x(:, k) > upper + slack)) then
           outside = outside + 1

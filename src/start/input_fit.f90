@@ -27,7 +27,7 @@ module input_fit
   public :: check_fit, report_file_problem, complete_settings
 
   !> Relative tolerance for touching disks.
-  real(real64), parameter, public :: rounding = 1.0e-12_real64
+  real(real64), parameter, public :: touching_tolerance = 1.0e-12_real64
   !> Packing fraction of the triangular lattice.
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)
   !> Ratio of the smallest to the largest radius above which the densest packing of unequal disks is
@@ -183,7 +183,7 @@ contains
       smallest = minval(extent%smallest, mask=within)
       largest = maxval(extent%largest, mask=within)
       most = densest_packing(smallest/largest)
-      if (packing <= most*(1 + rounding)) cycle
+      if (packing <= most*(1 + touching_tolerance)) cycle
       call groups(k)%complain("placement", "the disks in this region would fill "//written(packing)//" of it; disks with radii " &
         //"from "//written(smallest)//" to "//written(largest)//" fill at most "//written(most), problems)
       return
@@ -381,12 +381,12 @@ contains
       upper = s%region(2*axis)
       room = min(upper, high(axis)) - max(lower, low(axis))  ! width of the region between the displaced sides
       farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
-      least = merge(2*s%radius, 4*s%radius + rounding*farthest, alone)
+      least = merge(2*s%radius, 4*s%radius + touching_tolerance*farthest, alone)
       if (lower >= upper) then
         call complain("region", "its lower end "//written(lower)//" is not below its upper end "//written(upper))
       else if (lower < min(box%lower(axis), low(axis)) .or. upper > max(box%upper(axis), high(axis))) then
         call complain("region", "it extends beyond the box, "//written(box%lower(axis))//" to "//written(box%upper(axis)))
-      else if (.not. endless(axis) .and. 2*s%radius > room*(1 + rounding)) then
+      else if (.not. endless(axis) .and. 2*s%radius > room*(1 + touching_tolerance)) then
         call complain("radius", "a disk of diameter "//written(2*s%radius)//" does not fit in its region of width "//written(room))
       else if (box%periodic(axis) .and. least > box%upper(axis) - box%lower(axis)) then
         call complain("radius", "a periodic box must be "//trim(merge("at least one diameter wide", "wider than two diameters  ", &
@@ -414,7 +414,7 @@ contains
       variable = "radius"
       if (group%given("packing_fraction")) variable = "packing_fraction"
       filled = "the disks would fill "//written(packing)//" of their region; "
-      if (packing > closest_packing*(1 + rounding)) then
+      if (packing > closest_packing*(1 + touching_tolerance)) then
         call group%complain(variable, filled//"the closest packing is "//written(closest_packing), problems)
       else
         shortfall = s%placement%shortfall(packing)

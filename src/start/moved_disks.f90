@@ -3,7 +3,7 @@
 module moved_disks
   use box_sides, only: bounds
   use errors, only: error_t, exit_usage, fail
-  use input_fit, only: rounding
+  use input_fit, only: touching_tolerance
   use kinds, only: int32, real64
   use packing, only: packing_t
   use partners, only: obstacle_number
@@ -40,7 +40,7 @@ contains
       if (allocated(sim%waits)) then
         if (sim%waits(i)) cycle
       end if
-      slack = rounding*(radius(i) + maxval(radius))
+      slack = touching_tolerance*(radius(i) + maxval(radius))
       inset = merge(0.0_real64, radius(i) - slack, passed)
       if (any(x(:, i) < lower + inset(:, 1) .or. x(:, i) > upper - inset(:, 2))) then
         call complain(i, "is not wholly inside the box")

@@ -8,7 +8,7 @@ module variables
   use run_variables, only: change_rows, output_rows, run_rows, stop_rows
   use source_variables, only: source_rows
   use texts, only: joined, written
-  use variable_rows, only: in_motion, largest, most_disks, most_threads, name_length, never, obstacle_groups, on_resume, &
+  use variable_rows, only: at_no_time, in_motion, largest, most_disks, most_threads, name_length, obstacle_groups, on_resume, &
     smallest, variable_t, wall_groups
   implicit none
   private
@@ -28,10 +28,10 @@ contains
   !> The name may include the name of a side or species, as in `side.left.velocity`.
   pure function change_of(name) result(when)
     character(len=*), intent(in) :: name
-    character(len=len(never)) :: when
+    character(len=len(at_no_time)) :: when
     integer :: k
 
-    when = never
+    when = at_no_time
     do k = 1, size(table)
       if (table(k)%group == name(:index(name, ".") - 1) .and. table(k)%name == name(index(name, ".", back=.true.) + 1:)) &
         when = table(k)%may_change
