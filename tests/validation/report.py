@@ -21,8 +21,9 @@ beside this page. Both files are written by
 The *verdict* is the deviation from the reference divided by the tolerance: a value passes if its
 verdict is at most 1. If the reference is a bound (≤ or ≥), the verdict is 0 if the bound is
 satisfied. The table has one row for each case. If a case has several values, the row shows the one
-that is closest to its tolerance. Values that must agree to rounding (1e-9 or better) are only
-counted, in the row of their topic; [the second table](#cases-that-agree-to-rounding) lists them.
+that is closest to its tolerance. Values that must agree to rounding (1e-9 or better) have no
+rows of their own. The row of their topic counts them, and
+[the second table](#cases-that-agree-to-rounding) lists them.
 
 The column *source* names the origin of the reference:
 
@@ -116,7 +117,7 @@ and 8. In this program a disk lies completely inside its starting region, so tha
 
 **P11-10, time steps.** Time steps miss the fraction P(q) of the collisions, with q = g Δt / s, the
 relative speed g, the time step Δt and the sum s of the radii. The argument is q and not q / 2,
-because a collision is detected only while the disks approach each other, which they do along the
+because a collision is detected only while the disks approach each other. They approach along the
 first half of the path on which they overlap.
 
 **P12-06, diffusion in a Lorentz gas.** The density expansion of D_0/D has the coefficients -4/3,
@@ -152,8 +153,8 @@ velocity of about 0.65. With 600 disks of a fifth of the diameter, most disks ar
 chamber at 0.65.
 
 **P15-20, effusion.** The theoretical rate applies to an opening much narrower than the mean free
-path and than the chamber. The measured rate is 1.9(6) % higher if the opening is as wide as 0.05 of
-the chamber, and 5.4(6) % higher if it is also 0.2 mean free paths wide.
+path and than the chamber. The measured rate is 1.9(6) % higher if the opening is 0.05 times as wide
+as the chamber, and 5.4(6) % higher if the opening is also 0.2 mean free paths wide.
 
 **P15-21, discharge of a hopper.** The tolerance covers the values of the literature, k between 1
 and 2. Since k and the exponent are strongly correlated, each was fitted with the other one fixed.
@@ -273,9 +274,9 @@ contain it? The tables of this section, written by `python tests/coverage_tables
 answer. The systems and quantities were chosen before the first run, and the seeds of the tables
 were not used to improve the estimators. Some rows were measured again:
 
-- The first tables showed that four errors were wrong: those of the flow velocity, of the slopes
-  under gravity, of the coefficients from Helfand moments and of the thermalisation time. Their rows
-  were measured again with corrected estimators.
+- The first tables showed that four errors were wrong: the errors of the flow velocity, of the
+  slopes under gravity, of the coefficients from Helfand moments and of the thermalisation time.
+  Their rows were measured again with corrected estimators.
 - The rows of the Lyapunov exponent and of gases under gravity were repeated after the bias of the
   exponent and the equilibration had been changed.
 
@@ -284,9 +285,9 @@ single run, or to a group of runs if the name of the system states a number of r
 are:
 
 - *bars*: number of runs or groups.
-- *coverage*: percentage of the error bars that contain the true value, which is either known
-  exactly or the mean over all bars. The expected value is 68 %, and 61 to 75 % are allowed. For n
-  bars the percentage has a standard deviation of 47 / √n by chance.
+- *coverage*: percentage of the error bars that contain the true value. The true value is
+  either known exactly, or it is the mean over all bars. The expected value is 68 %, and 61 to 75 %
+  are allowed. For n bars the percentage has a standard deviation of 47 / √n by chance.
 - *error / scatter*: mean error divided by the standard deviation of the measured values. Errors
   with Student's t make this ratio larger than 1.
 - *three*: coverage of means over three bars, whose errors follow from their scatter.
