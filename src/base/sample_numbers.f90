@@ -56,7 +56,7 @@ contains
     part%integers = self%integers(:, :n)
   end function first
 
-  !> Keeps the first `n` samples and appends those of `new`.
+  !> Keeps the first `n` samples and appends the samples of `new`.
   subroutine insert(self, n, new)
     class(sample_t), intent(inout) :: self
     integer(int64), intent(in) :: n

@@ -224,8 +224,9 @@ contains
     end if
   end function suggestion
 
-  !> Known word that was probably meant by `word`: it starts with `word`, or differs from it in at
-  !> most a third of the letters. The result is empty if no known word is similar.
+  !> Known word that was probably meant by `word`. A known word is suggested if it starts with
+  !> `word`, or if it differs from `word` in at most a third of the letters. The result is empty if
+  !> no known word is similar.
   pure function nearest_word(word, known) result(nearest)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)

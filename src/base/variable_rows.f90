@@ -24,8 +24,8 @@ module variable_rows
 
   !> Input groups of obstacles.
   character(len=8), parameter, public :: obstacle_groups(2) = [character(len=8) :: "obstacle", "wall"]
-  !> Input groups of boundaries: sides of the box and obstacles. The reference file contains them as
-  !> comments.
+  !> Input groups of boundaries: sides of the box and obstacles. The reference file contains these
+  !> groups as comments.
   character(len=8), parameter, public :: wall_groups(*) = [character(len=8) :: "side", obstacle_groups]
 
   type(range_t), parameter, public :: anything = range_t(-largest, largest, "")
