@@ -1,6 +1,6 @@
 !> Active Brownian disks: Brownian dynamics with an additional self-propulsion velocity along the
-!> orientation of each disk. The orientation diffuses; that of chiral disks also turns at a constant
-!> rate.
+!> orientation of each disk. The orientation diffuses. The orientation of chiral disks also turns at
+!> a constant rate.
 module active
   use kinds, only: int32, pi, real64
   use box_geometry, only: box_t

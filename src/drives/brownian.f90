@@ -50,9 +50,9 @@ contains
       call fields%complain("temperature", "0 needs kind = 'active'; allowed: a number > 0")
   end subroutine check
 
-  !> Draws new velocities and angular velocities, relative to the velocity profile in a sheared box.
-  !> The random numbers depend only on the seed, the id of the disk and the number of the kick, not
-  !> on the order of the disks or the history of the run.
+  !> Draws new velocities and angular velocities. In a sheared box the new velocities are relative
+  !> to the velocity profile. The random numbers depend only on the seed, the id of the disk and the
+  !> number of the kick, not on the order of the disks or the history of the run.
   subroutine kick(self, sim, kicked)
     class(brownian_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim

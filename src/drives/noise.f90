@@ -48,8 +48,8 @@ contains
     call fields%read("keep_momentum", self%keep_momentum)
   end subroutine read_noise
 
-  !> Reports noise that conserves momentum if only one disk is driven, because the velocity of this
-  !> disk would never change.
+  !> Reports noise that conserves momentum if only one disk is driven. The velocity of this disk
+  !> would never change.
   subroutine check(self, fields, box, count, radius)
     class(noise_t), intent(in) :: self
     class(fields_t), intent(inout) :: fields

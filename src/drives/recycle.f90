@@ -138,8 +138,8 @@ contains
     yes = .true.
   end function moves_disks
 
-  !> True if the centre of any disk is in `from_region`. If no further event can occur, no other
-  !> disk will enter this region.
+  !> True if the centre of any disk is in `from_region`. The region stays empty if no further event
+  !> can occur, because no other disk then enters it.
   pure function can_act(self, sim) result(yes)
     class(recycle_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
