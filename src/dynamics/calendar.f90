@@ -19,7 +19,7 @@ module calendar
   real(real64), parameter :: events_per_window = 4.0_real64
   !> Number of disks up to which nearly all events fit into buckets.
   integer(int32), parameter :: few_disks = 5000
-  !> Distance, in windows, from the current window to the last prefetched one, for each stage of
+  !> Number of windows between the current window and the last prefetched window, for each stage of
   !> prefetching.
   integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]
   integer(int32), parameter :: stages = size(windows_ahead)
@@ -48,10 +48,10 @@ module calendar
   type :: calendar_t
     !> Circular buffer with the buckets of the next windows; indices 0:last_bucket.
     type(bucket_t), allocatable :: bucket(:)
-    !> Position in `filed` after the last entry in the list of each span; 0 for an empty list;
-    !> indices 0:last_span. A span has half as many windows as there are buckets. Since the array is
-    !> a circular buffer, like `bucket`, a list can also contain events of later spans with the same
-    !> index.
+    !> For each span, the position in `filed` after the last entry of the list, or 0 if the list is
+    !> empty; indices 0:last_span. A span has half as many windows as there are buckets. Like
+    !> `bucket`, the array is a circular buffer. A list can therefore also contain events of later
+    !> spans with the same index.
     integer(int32), allocatable :: list_end(:)
     !> Chunks of all lists, each with a link to the previous chunk of the same list; indices from 0.
     type(filed_t), allocatable :: filed(:)
@@ -81,8 +81,8 @@ contains
   !> Empties the calendar and chooses the numbers of buckets and spans. On average, all windows
   !> together contain at least 2n events, so that most events of n disks fit into the calendar. For
   !> many disks the number of buckets is limited, so that buckets and disks fit into the cache
-  !> together. Equal numbers of buckets and spans minimise the number of cache lines that are
-  !> written.
+  !> together. The number of cache lines that are written is smallest if there are as many buckets
+  !> as spans.
   subroutine empty(self, n)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: n                !! number of disks
@@ -187,8 +187,8 @@ contains
     yes = iand(window, shiftl(1_int32, self%log_span) - 1) == 0
   end function span_begins
 
-  !> Moves the events of the next span to their buckets. Valid events of later spans in the same
-  !> list remain there. Disks whose buckets are full are returned in `surplus`.
+  !> Moves the events of the next span to their buckets. Valid events of later spans stay in this
+  !> list. Disks whose buckets are full are returned in `surplus`.
   subroutine open_span(self, tag, n_surplus, surplus)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)

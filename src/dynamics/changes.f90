@@ -50,9 +50,9 @@ contains
     end do
   end function text_of_change
 
-  !> Replaces box, contact law and driving of a simulation, at the present time, by those of another
-  !> input with the same disks. Sides start new motions from their present positions: at the present
-  !> time, the old and the new law of motion must give the same position.
+  !> At the present time, replaces the box, the contact law and the driving of a simulation by those
+  !> of another input, which describes the same disks. Sides start new motions from their present
+  !> positions: at the present time, the old and the new law of motion must give the same position.
   subroutine change_system(sim, system, problem)
     type(simulation_t), intent(inout) :: sim
     type(system_t), intent(in) :: system
@@ -140,8 +140,8 @@ contains
       //" overlaps the line of the side, which can be closed only when no disk does"
   end function disk_in_the_way
 
-  !> Data required by another system that the disks lack, as part of a message; empty if nothing is
-  !> missing.
+  !> Data that another system requires but the disks lack, worded as part of a message; empty if
+  !> nothing is missing.
   pure function missing_data(one, other) result(problem)
     type(system_t), intent(in) :: one, other
     character(len=:), allocatable :: problem
@@ -214,8 +214,8 @@ contains
 
   !> Advances all disks to the present time under the old forces, so that all clocks are equal, and
   !> erases their last collision partners. With its new velocity a disk may collide with its last
-  !> partner again immediately; without the erasure, this collision would be mistaken for a rounding
-  !> error of the previous one.
+  !> partner again immediately. If the partner were not erased, this collision would be mistaken for
+  !> a rounding error of the previous collision.
   subroutine advance_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i

@@ -18,7 +18,7 @@ module epochs
   !> Intended number of collisions per disk in an epoch. Moving the time origin at the end of each
   !> epoch preserves the precision of times.
   integer(int64), parameter :: epoch_length = 24
-  !> Number of significant bits in a shift of the time origin, small enough for shifts to be added
+  !> Number of significant bits in a shift of the time origin. With so few bits, shifts can be added
   !> without rounding errors.
   integer, parameter :: significant_bits = 20
   !> A collapse is reported if time does not advance during at least `collapse_length` events, and
@@ -31,10 +31,11 @@ module epochs
   real(real64), parameter :: crushing = 1.0e6_real64
   !> Maximum packing fraction in the estimate of the event rate.
   real(real64), parameter :: densest = 0.9_real64
-  !> Maximum factor by which a single event may increase the speed of the fastest disk, and maximum
-  !> number of box edges that a disk may then travel in an epoch. A kick ends the epoch if a disk
-  !> would have travelled farther since the time origin at its new speed, because rounding errors of
-  !> the time would displace it noticeably.
+  !> Two limits with the same value. The first is the factor by which a single event may increase
+  !> the speed of the fastest disk. The second is the distance that a disk may travel in an epoch,
+  !> in box edges. An event that may exceed both limits ends the epoch. A kick ends the epoch if the
+  !> time since the time origin, multiplied by the new speed of a disk, exceeds the second limit:
+  !> the rounding error of this time would displace the disk noticeably.
   real(real64), parameter :: farthest = 1.0e3_real64
 
 contains
@@ -99,11 +100,11 @@ contains
   end subroutine begin_epoch
 
   !> Ends the epoch and moves the time origin to about the present time, which preserves the
-  !> precision of times. Afterwards all events must be predicted anew, so this is also when the
-  !> disks are sorted by cells. The end of the next epoch is a fixed time and not a fixed number of
-  !> events, so that all domains can independently end the epoch at the same time. If the epoch was
-  !> ended by a single event or a kick (see `ends_by_event` and `ends_by_kick`), a disk can be much
-  !> faster than before, and the time origin moves exactly to the present time.
+  !> precision of times. All events must then be predicted anew. For this reason the disks are also
+  !> sorted by cells at this time. The end of the next epoch is a fixed time and not a fixed number
+  !> of events, so that all domains can independently end the epoch at the same time. An epoch can
+  !> also be ended by a single event or a kick (see `ends_by_event` and `ends_by_kick`). A disk can
+  !> then be much faster than before, so the time origin moves exactly to the present time.
   subroutine move_epoch(sim, is_urgent)
     type(simulation_t), intent(inout) :: sim
     logical, intent(in) :: is_urgent               !! whether the epoch was ended by a single event or a kick
@@ -171,10 +172,11 @@ contains
     n = sim%epoch_events + 2*events_per_epoch(sim)
   end function most_events
 
-  !> True if the first event ends the epoch, because it can make a disk so fast that the time since
-  !> the time origin is too inexact. Slow disks become fast if they are rough and rotate fast, or if
-  !> they reach a moving or hot boundary. Since the result must depend only on the state, it is
-  !> .false. if velocities also change without events.
+  !> True if the first event ends the epoch, because it can make a disk very fast. The rounding
+  !> error of the time since the time origin would displace such a disk noticeably. Slow disks
+  !> become fast if they are rough and rotate fast, or if they reach a moving or hot boundary. The
+  !> result must depend only on the state. It is therefore .false. under gravity and shear, which
+  !> change velocities also between events.
   pure function ends_by_event(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -190,8 +192,7 @@ contains
     if (possible*sim%epoch_end > farthest*maxval(sim%box%edges())) yes = possible > farthest*fastest_disk(sim)
   end function ends_by_event
 
-  !> True if a kick ends the epoch, because it has made a disk so fast that the time since the time
-  !> origin is too inexact.
+  !> True if a kick ends the epoch, because it has made a disk very fast (see `ends_by_event`).
   pure function ends_by_kick(sim, kicked) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: kicked(:)        !! indices of the disks accelerated by the kick
@@ -243,10 +244,11 @@ contains
       .and. sim%tally%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
   end function stands_still
 
-  !> True if all disks under gravity are at rest at the end of an epoch. The test is made only
-  !> there, so that the result does not depend on when the caller pauses. The whole epoch must
-  !> consist of unresolved bounces, because a ball whose bounces still converge must execute all of
-  !> them. If the epoch ends in such a state, this state is the last of the run.
+  !> True if all disks under gravity are at rest at the end of an epoch. The test is made only at
+  !> the end of an epoch, so that the result does not depend on when the caller pauses. The whole
+  !> epoch must consist of unresolved bounces, because a ball whose bounces still converge must
+  !> execute all of them. If the disks are at rest at the end of an epoch, the run ends in this
+  !> state.
   pure function has_come_to_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -264,9 +266,8 @@ contains
     yes = sim%now - sim%epoch_begin <= real(sim%tally%events - sim%epoch_events, real64)*longest
   end function has_come_to_rest
 
-  !> Maximum duration of a bounce of disk i that is negligible or too low to be resolved. A bounce
-  !> is too low if its height is less than an eighth of the spacing of the disk's coordinates
-  !> [time].
+  !> Duration up to which a bounce of disk i is negligible or too low to be resolved. A bounce is
+  !> too low if its height is less than an eighth of the spacing of the disk's coordinates [time].
   pure function unresolved_bounce(sim, i) result(long)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
@@ -312,12 +313,13 @@ contains
     if (yes) yes = is_at_rest(sim)
   end function stays_at_rest
 
-  !> The disk of lowest id that rests on a side while other disks move, and this side; 0 if there
-  !> is none. Its last event and its next bounce on a dissipative side are both within
-  !> `negligible_time` of the present time. Its bounces are lower than the spacing of its
-  !> coordinates; they therefore converge, and time stops advancing. The next bounce is computed
-  !> here, because the event that a disk stores depends on the search, and the parallel engine may
-  !> not have predicted any.
+  !> The disk that rests on a side while other disks move, and this side; 0 if there is none. If
+  !> several disks rest on sides, the result is the disk with the lowest id. The last event of this
+  !> disk and its next bounce on a dissipative side are both within `negligible_time` of the present
+  !> time. Its bounces are lower than the spacing of its coordinates. They are therefore not
+  !> resolved: they converge, and time stops advancing. The next bounce is computed here, because
+  !> the event that a disk stores depends on the search, and the parallel engine may not have
+  !> predicted any.
   pure function disk_on_side(sim) result(found)
     type(simulation_t), intent(in) :: sim
     integer(int32) :: found(2)                       !! index of the disk, and code of the side
@@ -337,8 +339,8 @@ contains
     end do
   end function disk_on_side
 
-  !> True if a side is dissipative, and disk i moves so slowly relative to it that its bounces are
-  !> not resolved.
+  !> True if a side is dissipative, and disk i moves so slowly relative to the side that its bounces
+  !> are not resolved.
   pure function bounces_converge(sim, i, side) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
@@ -354,8 +356,8 @@ contains
   end function bounces_converge
 
   !> The last event of disks at rest, as far as the state determines it: the disk with the latest
-  !> clock (of several disks, that with the lowest id) and its last collision partner or, if this is
-  !> a side, the nearest side; 0 if there was no event.
+  !> clock, and its last collision partner; 0 if there was no event. Among disks with equal clocks,
+  !> the disk with the lowest id is chosen. If the partner was a side, the nearest side is returned.
   pure function last_encounter(sim) result(pair)
     type(simulation_t), intent(in) :: sim
     integer(int32) :: pair(2)                        !! index of the disk, and its partner: see `partners`

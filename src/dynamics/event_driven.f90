@@ -34,8 +34,8 @@ module event_driven
   integer(int32), parameter :: disks_in_cache = 20000
   integer(int64), parameter :: events_ahead = 8    !! number of events between two prefetches
 
-  !> Disk-disk collisions that need the general procedure: those of disks with equal clocks, those
-  !> of disks that have hardly moved relative to each other, or all.
+  !> Disk-disk collisions that need the general procedure: collisions of disks with equal clocks,
+  !> collisions of disks that have hardly moved relative to each other, or all collisions.
   integer, parameter :: if_clocks_are_equal = 0, if_hardly_moved = 1, always = 2
 
   type, extends(evolution_t) :: event_driven_t
@@ -256,7 +256,7 @@ contains
     real(real64), intent(in) :: t
     type(event_log_t), intent(inout), optional :: log
     logical :: counts, is_general
-    real(real64) :: s      ! time since the later of the previous events of both disks [time]
+    real(real64) :: s      ! time since the previous event of either disk, whichever was later [time]
 
     counts = .true.
     if (self%is_part) counts = self%counts(sim%tag, i, code)
@@ -267,7 +267,7 @@ contains
           ! have collided at exactly the present time.
           is_general = .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0
         else if (self%general == if_hardly_moved) then
-          ! One component of the displacement suffices, because `watch` tests both.
+          ! One component of the displacement suffices here, because `watch` tests both components.
           s = t - max(sim%disk(i)%clock, sim%disk(code)%clock)
           is_general = (s*(sim%disk(code)%v(1) - sim%disk(i)%v(1)))**2 <= (still*(sim%disk(i)%radius + sim%disk(code)%radius))**2
           if (is_general) call watch(sim, i, code, t, self%is_part)
@@ -380,8 +380,8 @@ contains
     call self%queue%schedule(sim%disk, sim%tag, i)
   end subroutine predict
 
-  !> Predicts the events of all disks after each event, and not only of those involved: the simplest
-  !> textbook algorithm.
+  !> Predicts the events of all disks after each event, and not only the events of the disks
+  !> involved. This is the simplest algorithm, found in textbooks.
   subroutine predict_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -39,9 +39,9 @@ contains
     if (.not. (yes .or. a%time > b%time)) yes = wins(a, b, tag)
   end function precedes
 
-  !> Nonzero if the simultaneous events a and b must be ordered by `precedes`; a must not be earlier
-  !> than b. Usually they are the two copies of one collision, stored by both disks, whose order
-  !> does not matter.
+  !> Nonzero if the events a and b are simultaneous and must be ordered by `precedes`; a must not be
+  !> earlier than b. Simultaneous events are usually the two copies of one collision, stored by both
+  !> disks. The order of these copies does not matter.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits

@@ -94,9 +94,9 @@ contains
     end do
   contains
 
-    !> Width of a window with `events_per_window` events on average, from the event rate since the
-    !> last `fill`; at first, from the median waiting time in a sample of disks. Without events the
-    !> width is `never`.
+    !> Width of a window that contains `events_per_window` events on average. The event rate is
+    !> measured since the last `fill`; at first, it is estimated from the median waiting time in a
+    !> sample of disks. Without events the width is `never`.
     pure function window_width() result(width)
       real(real64) :: width, waits(sample_size), swap
       integer :: i, k, n_waits
@@ -201,8 +201,8 @@ contains
   end subroutine insert_into_heap
 
   !> Inserts an event into a sorted list of n events. Comparing the times is nearly always
-  !> sufficient: simultaneous events are usually the two copies of one collision, stored by both
-  !> disks, whose order does not matter.
+  !> sufficient. Simultaneous events are usually the two copies of one collision, stored by both
+  !> disks, and the order of these copies does not matter.
   pure subroutine insert(list, n, event, tag)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n

@@ -19,7 +19,7 @@ module evolution
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! dissipated energy [energy]
     logical :: at_rest = .false.      !! whether the dynamics returns when all disks are at rest
-    !> Number of disks in the box after a departure; -1: no limit.
+    !> Number of disks in the box at which the dynamics returns after a departure; -1 for no limit.
     integer(int64) :: disks_inside = -1
     !> Number of iterations of the event loop after which the dynamics returns, so that the caller
     !> can check signals and the wall clock.

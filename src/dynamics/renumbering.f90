@@ -38,8 +38,8 @@ contains
     call move_in_order(sim, order)
   end subroutine renumber
 
-  !> Permutes the disks in place, without a second copy of all disks, most of which are already
-  !> close to their new position in memory.
+  !> Permutes the disks in place, without a second copy of all disks. Most disks are already close
+  !> to their new position in memory.
   subroutine move_in_order(sim, order)
     type(simulation_t), intent(inout) :: sim
     !> On entry, the index of the disk that belongs at each position; on return, the identity

@@ -91,8 +91,8 @@ contains
   end function is_met
 
   !> True if the disks are at rest and the input contains the stop rule `at_rest`. This test is
-  !> needed without gravity, where disks at rest have no events: no epoch ends, and the test at the
-  !> end of an epoch is never made.
+  !> needed without gravity, because disks at rest then have no events. No epoch ends, and the test
+  !> at the end of an epoch is never made.
   pure function rests(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

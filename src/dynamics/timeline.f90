@@ -175,9 +175,9 @@ contains
   end subroutine report_rest
 
   !> Number of iterations of the event loop that take about the wall-clock time `pause_interval`.
-  !> The number is increased only after a call that used all its iterations. If calls that reach a
-  !> limit early increased it too, it would grow without bound in a run with many samples, and
-  !> signals would remain unchecked for hours after the last sample.
+  !> The number is increased only after a call that used all its iterations. It is not increased
+  !> after calls that reach a limit early. Otherwise it would grow without bound in a run with many
+  !> samples, and signals would remain unchecked for hours after the last sample.
   pure function adapted_iterations(iterations, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: iterations
     real(real64), intent(in) :: elapsed               !! wall-clock time of the iterations [s]

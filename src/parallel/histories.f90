@@ -33,8 +33,8 @@ module histories
     integer(int32) :: deep_low(2) = 0, deep_high(2) = 0
     !> Range of columns and rows of the cells whose eight neighbours are all in the extended domain.
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0
-    !> Flags of the cells, with indices from 0: 1 for each cell outside the domain that an owned
-    !> disk has reached, and for its eight neighbours, otherwise 0.
+    !> Flags of the cells, with indices from 0. The flag is 1 for each cell outside the domain that
+    !> an owned disk has reached, and for the eight neighbours of such a cell; otherwise it is 0.
     integer(int8), allocatable :: reached(:, :)
     !> Whether an owned disk has reached the edge of the extended domain.
     logical :: left_domain = .false.
