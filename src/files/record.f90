@@ -113,8 +113,8 @@ contains
     call self%pass(file, c_loc(values), size(values))
   end subroutine exchange_longs
 
-  !> Writes the checksum at the end of a record, or compares the stored checksum with that of the
-  !> numbers read. A difference is recorded as a failure of the file.
+  !> Writes the checksum at the end of a record, or compares the stored checksum with the checksum
+  !> of the numbers that were read. A difference is recorded as a failure of the file.
   subroutine seal(self, file)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
