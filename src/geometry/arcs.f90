@@ -103,9 +103,9 @@ contains
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: c(2)            !! [length]
     logical :: yes
-    ! Cross products. `after_first` is positive if the vector is less than half a turn
-    ! counter-clockwise of the first end of the arc. `before_last` is positive if the last end is
-    ! less than half a turn counter-clockwise of the vector.
+    ! Cross products. `after_first` is positive if the first end of the arc reaches the vector by a
+    ! counter-clockwise rotation of less than half a turn. `before_last` is positive if the vector
+    ! reaches the last end by such a rotation.
     real(real64) :: after_first, before_last
 
     associate (first => self%end_direction(:, 1), last => self%end_direction(:, 2))
@@ -201,10 +201,10 @@ contains
       t = never
     end function time_to_face
 
-    !> True if a disk on a straight path moves away from a point or, within rounding errors, at a
-    !> right angle to the direction of the point. A disk moving away from the centre of a circle
-    !> cannot collide with the circle from outside; without this test, rounding errors could cause a
-    !> second collision with the same face or end of the arc.
+    !> True if a disk on a straight path moves away from a point. Within rounding errors, the path
+    !> may also be at a right angle to the direction of the point. A disk moving away from the
+    !> centre of a circle cannot collide with the circle from outside; without this test, rounding
+    !> errors could cause a second collision with the same face or end of the arc.
     pure function grazes(from) result(yes)
       real(real64), intent(in) :: from(2)       !! vector from the point to the centre of the disk [length]
       logical :: yes
@@ -268,9 +268,10 @@ contains
       magnitude(abs(c) + half) >= self%radius - radius - slack
   end function reaches
 
-  !> Sufficient test for the arc to exclude the centres of disks from a whole rectangle: a disk in
-  !> its middle overlaps the arc by more than half the diagonal. For a large rectangle the result
-  !> may be .false. although the arc excludes it completely.
+  !> Sufficient test of whether the arc excludes the centres of disks from a whole rectangle: a disk
+  !> in the middle of the rectangle overlaps the arc by more than half the diagonal of the
+  !> rectangle. For a large rectangle the result may be .false. although the arc excludes it
+  !> completely.
   pure function covers(self, d, half, radius) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius

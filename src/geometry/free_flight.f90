@@ -246,8 +246,8 @@ contains
   end function time_to_circle_falling
 
   !> A power of two that exceeds all roots of a cubic polynomial (Fujiwara's bound) and the square
-  !> root of `time2`, which matters if all roots are zero. With a power of two, a change of units by
-  !> another power of two scales all results exactly.
+  !> root of `time2`. The square root matters only if all roots are zero. With a power of two, a
+  !> change of units by another power of two scales all results exactly.
   pure function root_bound(cubic, time2) result(bound)
     real(real64), intent(in) :: cubic(0:3), time2
     real(real64) :: bound

@@ -1,6 +1,6 @@
 !> Interface of fixed obstacles of all shapes. The neighbour search, the placement of disks,
-!> time-stepped dynamics and the observables use only `shape_t`, whether an obstacle is a circle, an
-!> arc or a straight wall.
+!> time-stepped dynamics and the observables use only `shape_t`. They need not distinguish circles,
+!> arcs and straight walls.
 module shapes
   use images, only: images_t
   use kinds, only: real64
