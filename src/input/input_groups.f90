@@ -38,7 +38,7 @@ module input_groups
   end type value_t
 
   !> One group of the input. A repeated group is stored once per instance. Functions that return the
-  !> value of a variable return `otherwise` for a variable without a value.
+  !> value of a variable return `otherwise` if the variable has no value.
   type :: group_t
     character(len=8) :: name = ""
     !> Name of an instance of a repeated group; otherwise blank.

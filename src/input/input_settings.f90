@@ -187,8 +187,8 @@ contains
     end do
   end subroutine take_sources
 
-  !> Reads one source. If the source names no species, there must be only one, to which its disks
-  !> belong.
+  !> Reads one source. If the source names no species, the input must contain a single species, to
+  !> which the disks of the source belong.
   subroutine take_source(group, species, box, source, problems)
     type(group_t), intent(inout) :: group
     character(len=*), intent(in) :: species(:)          !! names of the species

@@ -58,7 +58,8 @@ contains
         if (.not. s%mass_in_file) call group%put_reals("mass", [s%mass])
         if (s%mass_in_file) call group%values(row_of("species", "mass"))%clear()
         if (.not. s%radius_in_file) call group%put_reals("radius", [s%radius])
-        ! A given value stays as it is: read again, a rounded value could lead to another radius.
+        ! A packing fraction given by the user is not overwritten. Its rounded value, when read
+        ! again, could lead to another radius.
         if (s%radius > 0 .and. s%radius < sqrt(area(s%region)) .and. .not. (s%polydispersity > 0 &
           .or. group%given("packing_fraction"))) call group%put_reals("packing_fraction", [s%count*pi*s%radius**2/area(s%region)])
         call group%put_reals("region", s%region)

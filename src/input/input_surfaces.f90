@@ -77,7 +77,7 @@ contains
       end do
     end subroutine take_walls
 
-    !> Arcs of a group, all of which extend from the same angle to the same angle.
+    !> Arcs of a group. They have a common first angle and a common last angle.
     subroutine take_arcs(centre, radius, from_angle, to_angle)
       !> x and y of the centre of curvature of each arc [length].
       real(real64), intent(in) :: centre(:)

@@ -20,7 +20,7 @@ module input_text
   !> First bytes of an HDF5 file (HDF5 File Format Specification, section II.A)
   character(len=*), parameter :: hdf5_signature = achar(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
 
-  !> Kinds of tokens. A single character such as & or = is a kind of its own; the kind of a quoted
+  !> Kinds of tokens. A single character such as & or = forms its own kind. The kind of a quoted
   !> string is its quotation mark.
   character(len=1), parameter :: word = "w", unclosed = "u", junk = "?", ending = "e"
   character(len=*), parameter :: blanks = " "//achar(9), quotes = "'""", marks = "&/=,()"

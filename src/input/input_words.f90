@@ -98,7 +98,7 @@ contains
 
     hint = ""
     do k = 1, size(tokens), 2
-      if (tokens(k + 1)%first /= tokens(k)%last + 2) return         ! more than a comma between the numbers
+      if (tokens(k + 1)%first /= tokens(k)%last + 2) return         ! not only a comma between the numbers
       if (verify(content(text, tokens(k + 1)), digits) > 0) return
     end do
     hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))//"? the decimal sign is a point"
