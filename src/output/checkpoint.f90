@@ -352,7 +352,8 @@ contains
 
   !> Reports an error if the scheduled changes before the checkpoint differ from those that the run
   !> has made, or if a later change has a time that has already passed. With time steps, a change
-  !> within a step is made at the end of the step; a run saved within this step can still make it.
+  !> within a step is made at the end of the step. A run saved within this step has not made the
+  !> change yet.
   subroutine check_changes(evolution, sim, path, error)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim

@@ -181,10 +181,10 @@ contains
     end if
   end subroutine check_room
 
-  !> Opens the output of a resumed run after `claim`. New samples follow those written before the
-  !> checkpoint, and later samples are overwritten. A finished output is left unchanged until the
-  !> continued run has finished. The run writes to a new file if the old file describes a different
-  !> input or has less space than a new run would reserve.
+  !> Opens the output of a resumed run after `claim`. New samples follow the samples written before
+  !> the checkpoint. Samples written after the checkpoint are overwritten. A finished output is left
+  !> unchanged until the continued run has finished. The run writes to a new file if the old file
+  !> describes a different input or has less space than a new run would reserve.
   subroutine resume(self, input, sim, progress, finished, error)
     class(output_t), intent(inout) :: self
     type(run_input_t), intent(in) :: input
@@ -262,7 +262,7 @@ contains
     end associate
   end subroutine plan
 
-  !> Smallest possible number of logged events of a run that ends at a number of events or
+  !> Smallest possible number of logged events, for a run that ends at a number of events or
   !> collisions; 0 if another stop rule can end the run.
   pure function planned_events(limits) result(n)
     type(limits_t), intent(in) :: limits          !! limits of the run

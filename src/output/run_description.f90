@@ -151,7 +151,7 @@ contains
       if (s > 0) n = sim%species(s)%count
       call file%make_group(group)
       call file%put(group//"@dimension", scalar, [2_int32])
-      ! in an open system an observable
+      ! in an open system the number of disks is an observable
       if (.not. sim%features%open) call file%put(group//"/particle_number", scalar, [n])
     end do
   end subroutine describe_populations

@@ -180,14 +180,15 @@ contains
     end associate
     settled = merge(1, 0, sim%events_done)
     do k = 1, merge(1, 0, sim%features%rotation) + merge(2, 0, sim%features%orientation)
-      ! Copies of `settled` make the length of the record depend on whether the run has rotation and
-      ! orientation, so that a checkpoint of a run with different features is detected.
+      ! `settled` is copied several times, so that the length of the record depends on whether the
+      ! run has rotation and orientation. A checkpoint of a run with different features is then
+      ! detected.
       call record%exchange(file, settled)
     end do
     if (allocated(sim%series)) call record%pass(file, c_loc(sim%series(1)), size(sim%series)*storage_size(sim%series)/64)
     if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
     if (.not. sim%features%own_sizes) return
-    mass = sim%masses()      ! individual masses are stored even if all equal the mass of the species
+    mass = sim%masses()      ! also if all masses equal the mass of the species
     call record%exchange(file, mass)
     if (record%mode == reading) sim%own_mass = mass
   end subroutine exchange_disks
