@@ -1,8 +1,9 @@
-!> ne domain of a divided simulation, with its own event-driven engine. A domain owns the disks in
-!> rectangle of cells and contains ghosts (copies) of the disks in the halo around it; rectangle nd
-!> halo form the extended domain, with the cells in `layout`. Disks that would enter the extended
-!> domain during a ime window are missing. Errors in the motion of ghosts therefore spread inwards
-!> from its edge, ntil `domain_borders` corrects the ghosts after the window.
+!> One domain of a divided simulation, with its own event-driven engine. A domain owns the disks in
+!> a rectangle of cells and contains ghosts (copies) of the disks in the halo around it. Rectangle
+!> and halo form the extended domain, with the cells in `layout`. Disks that would enter the
+!> extended domain during a time window are missing. Errors in the motion of ghosts therefore spread
+!> inwards from the edge of the extended domain, until `domain_borders` corrects the ghosts after
+!> the window.
 module domains
   use kinds, only: int32, int64, real64
   use cell_layout, only: cell_layout_t

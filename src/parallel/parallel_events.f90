@@ -24,13 +24,14 @@ module parallel_events
   !> Domains pay off if at least this number of events per disk remains before the next limit:
   !> `least_left` if domains are in use, otherwise `least_left_to_begin`.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
-  !> Minimum and maximum period of the serial engine when domains cannot be used: a limit or an
-  !> inelastic collapse was reached, or no event is left [events per disk].
+  !> Minimum and maximum length of a period of the serial engine that begins because domains cannot
+  !> be used: a limit or an inelastic collapse was reached, or no event is left [events per disk].
   integer(int64), parameter :: brief(2) = 5
-  !> Minimum and maximum period of the serial engine after invalid windows [events per disk].
-  integer(int64), parameter :: after_failures(2) = [5, 5*2**20]
-  !> Minimum and maximum period of the serial engine while other programs use the cores [events per
+  !> Minimum and maximum length of a period of the serial engine after invalid windows [events per
   !> disk].
+  integer(int64), parameter :: after_failures(2) = [5, 5*2**20]
+  !> Minimum and maximum length of a period of the serial engine while other programs use the cores
+  !> [events per disk].
   integer(int64), parameter :: while_busy(2) = [50, 1600]
 
   !> Values of `predicted_by`: the engine that predicted the events.
@@ -40,8 +41,8 @@ module parallel_events
     !> Template of the serial engine, copied when the serial engine is needed.
     type(event_driven_t) :: serial
     type(partition_t) :: parts
-    !> Minimum number of disks in a domain. In a periodic box, where domains have neighbours on all
-    !> sides, it is twice as large.
+    !> Minimum number of disks in a domain. The minimum is twice as large in a periodic box, where
+    !> domains have neighbours on all sides.
     integer(int32) :: least_disks = 1250
     !> Maximum number of disks in a domain that fits into the cache.
     integer(int32) :: most_disks = 62000
@@ -232,8 +233,9 @@ contains
   end subroutine shorten_windows
 
   !> Selects the serial engine for a period. The period is twice as long as the previous one, unless
-  !> the domains have meanwhile executed more events than the serial engine did then. Owing to this
-  !> doubling, a run unsuitable for domains takes hardly longer than with the serial engine alone.
+  !> the domains have meanwhile executed more events than the serial engine executed in the previous
+  !> period. Owing to this doubling, a run unsuitable for domains takes hardly longer than with the
+  !> serial engine alone.
   subroutine use_serial_engine(self, sim, periods)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

@@ -112,7 +112,8 @@ contains
   end subroutine fill
 
   !> Updates the measured event rate, which determines the length of windows, and the measured
-  !> number of iterations per event. The limit of iterations is proportional to the product of both.
+  !> number of iterations per event. The limit of iterations is proportional to the product of these
+  !> two numbers.
   pure subroutine update_rates(self, events, iterations, time)
     class(partition_t), intent(inout) :: self
     integer(int64), intent(in) :: events, iterations
