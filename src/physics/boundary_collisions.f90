@@ -74,10 +74,10 @@ contains
     if (left >= -dot_product(before - normal_velocity, normal)) v = v - left*normal
   end subroutine end_bouncing
 
-  !> Transfers momentum between a disk and a piston. On entry the disk has the velocity of its
-  !> rebound from a piston of infinite mass; its impulse is reduced to that for the actual mass. On
-  !> return u is the mean of the piston velocities before and after the collision, with which the
-  !> work of the piston is calculated.
+  !> Transfers momentum between a disk and a piston. On entry the disk has the velocity after a
+  !> collision with a piston of infinite mass. The procedure reduces its impulse to the value for
+  !> the actual mass. On return u is the mean of the piston velocities before and after the
+  !> collision, with which the work of the piston is calculated.
   pure subroutine move_piston(sim, i, code, normal, before, u, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -94,8 +94,8 @@ contains
       v = sim%box%side_velocity(1 - code, t)
       given = motion%taken_from(dot_product(disk%v - before, normal), sim%mass_of(i))
       disk%v = disk%v - given*normal
-      ! Moves the piston into contact with the disk, by the formula of `side_time`; otherwise
-      ! rounding errors would separate it from a disk at rest.
+      ! Moves the piston into contact with the disk, by the formula of `side_time`. Rounding errors
+      ! would otherwise separate the piston from a disk at rest.
       side%position = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
         (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
       ! rounding errors must not make the piston faster than the disk
@@ -126,13 +126,13 @@ contains
   end subroutine draw_thermal_velocity
 
   !> Separates disk i from a surface on which it rests. With zero restitution the first collision
-  !> stops the normal motion of the disk, after which the elastic collisions of the TC model would
-  !> be infinitely many at one and the same time. The normal velocity is therefore chosen such that
-  !> the next contact with the surface is 0.4 to 0.8 contact durations later.
+  !> stops the normal motion of the disk. The TC model would then cause infinitely many elastic
+  !> collisions at one and the same time. The normal velocity is therefore chosen such that the next
+  !> contact with the surface is 0.4 to 0.8 contact durations later.
   !>
   !> In a container hardly larger than the disk, no velocity achieves this. If the disk leaves the
-  !> surface in an elastic collision, it keeps that velocity. Otherwise, of the velocities tried,
-  !> the one with the latest contact is used.
+  !> surface in an elastic collision, it keeps the velocity of this collision. Otherwise several
+  !> velocities are tried, and the velocity with the latest contact is used.
   pure subroutine separate_from_surface(sim, i, code, normal)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -180,8 +180,8 @@ contains
   end subroutine apply_tangential_impulse_at_wall
 
   !> Adds a collision with a side or obstacle to the counters and sums. The energy change of the
-  !> disk minus the work of the surface is the heat transferred by a thermal wall; for any other
-  !> wall it is the negative of the dissipated energy.
+  !> disk minus the work of the surface is the heat transferred by a thermal wall. For any other
+  !> wall, this difference is the negative of the dissipated energy.
   pure subroutine add_wall_sums(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

@@ -11,15 +11,15 @@ module disks
   public :: disks_before, advance_disk, list_by_id, longest_name, names_of, species_by_id
 
   !> Position, velocity and clock of a disk change only in its own collisions and when it passes a
-  !> periodic side. At other times, the position is extrapolated from them.
+  !> periodic side. At other times, the position is extrapolated from these data.
   type :: disk_t
     real(real64) :: x(2) = 0.0_real64           !! position at `clock` [length]
     real(real64) :: v(2) = 0.0_real64           !! velocity at `clock` [length/time]
     real(real64) :: clock = 0.0_real64          !! time of `x` and `v`, relative to `box%epoch` [time]
     real(real64) :: radius = 0.0_real64         !! [length]
     ! Derived data: the collision counter, and the next event as predicted by the search. The
-    ! counter is the number of changes of x and v in the present epoch. If the counter of the
-    ! partner has changed, an event is stale.
+    ! counter is the number of changes of x and v in the present epoch. An event is stale if the
+    ! counter of the partner has changed since the prediction.
     integer(int32) :: collision_counter = 0
     integer(int32) :: partner = 0     !! partner in the next event: a disk (> 0) or another code of `partners`
     real(real64) :: event_time = 0.0_real64     !! time of the next event, relative to `box%epoch` [time]
@@ -82,7 +82,8 @@ module disks
   !> connected by common disks (see `collapses`).
   type :: series_t
     real(real64) :: time = -never               !! time of the last series, relative to `box%epoch` [time]
-    !> Id of a disk of the same series; leads to the disk that represents the series.
+    !> Id of a disk of the same series. Following these ids from disk to disk leads to the disk that
+    !> represents the series.
     integer(int32) :: root = 0
     integer(int32) :: disks = 0                 !! number of disks in the series represented by this disk
     !> Number of collisions in the series represented by this disk.

@@ -24,7 +24,8 @@ module encounters
 
 contains
 
-  !> True if all collisions need the general procedure `collide`. An event log needs it as well.
+  !> True if all collisions need the general procedure `collide`. An event log also needs this
+  !> procedure.
   pure function need_general(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -220,8 +221,8 @@ contains
   end subroutine apply_tangential_impulse
 
   !> Momentum change of disk i in a collision with a surface or with disk j. If disk i is far
-  !> heavier than disk j, its velocity change is dominated by rounding errors, and the momentum
-  !> change is computed from that of disk j.
+  !> heavier than disk j, its velocity change is dominated by rounding errors. The momentum change
+  !> is then computed from the velocity change of disk j.
   pure function momentum_change(sim, i, j, v, w) result(change)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
@@ -312,8 +313,8 @@ contains
     call remove_residual_approach(sim, i, j)
   end subroutine add_pair_sums
 
-  !> Replaces the separation and relative velocity of two disks at the time t by those of the first
-  !> disk and the nearest periodic image of the second.
+  !> Replaces the separation and relative velocity of two disks at the time t by the values between
+  !> the first disk and the nearest periodic image of the second disk.
   pure subroutine use_nearest_image(sim, t, dx, dv)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: t
@@ -330,8 +331,8 @@ contains
   end subroutine use_nearest_image
 
   !> True if disks i and j, touching at the time t, are still in contact after their last collision,
-  !> through the same periodic image. Free disks can then approach each other only because of a
-  !> rounding error, from the shift of one of them by a period.
+  !> through the same periodic image. Free disks can approach each other after such a collision only
+  !> because of a rounding error, which arises when one of them is shifted by a period.
   pure function are_in_contact(sim, i, j, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -478,8 +479,8 @@ contains
     end associate
   end subroutine pass_sheared_boundary
 
-  !> Part of a message: disk i, its partner and the present time. Of two disks, the one with the
-  !> lower id is first, whichever of them predicted the event.
+  !> Part of a message: disk i, its partner and the present time. The disk with the lower id is
+  !> named first, whichever of the two disks predicted the event.
   pure function encounter_text(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code      !! index of the disk and code of its partner; see `partners`

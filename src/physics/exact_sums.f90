@@ -12,12 +12,12 @@ module exact_sums
   real(real64), parameter :: most_units = 2.0_real64**digits_of_bound
   real(real64), parameter :: rare_unit = 2.0_real64**digits_of_rare
   integer, parameter :: digits_of_most = 125
-  !> Maximum of the component `rare` of a sum, beyond which its value is NaN.
+  !> Maximum of the component `rare` of a sum. Beyond this maximum the value of the sum is NaN.
   integer(int128), parameter :: most = 2_int128**digits_of_most
 
   !> A fixed-point sum. Terms above the bound passed to `choose_unit` are also added exactly, at a
-  !> slightly higher cost. Up to 2**35 terms below 2**90 units cannot overflow; of larger terms, the
-  !> multiples of 2**90 units are counted in `rare`.
+  !> slightly higher cost. Up to 2**35 terms below 2**90 units cannot cause an overflow. A larger
+  !> term is split, and its multiples of 2**90 units are counted in `rare`.
   type :: exact_sum_t
     integer(int128) :: units = 0
     integer(int128) :: rare = 0                          !! number of multiples of 2**90 units

@@ -202,7 +202,7 @@ contains
     call empty%make_room(0)
     call empty%tally%make_room(n_sides)
     empty%box = box_t()
-    empty%box%surface%law%temperature = 1         ! with thermal, moving walls all their observables exist
+    empty%box%surface%law%temperature = 1         ! thermal, sliding walls have every observable of walls
     empty%box%surface%law%speed = 1
     empty%features%stress = .true.
     empty%features%helfand = .true.

@@ -15,9 +15,9 @@ module partners
 
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_crossing = -2000000000
-  !> Code of an event after which contacts must be searched anew, because the disk leaves the region
-  !> searched so far but stays in its cell: `looks_again`, or `looks_again` - 1 through the right or
-  !> upper edge.
+  !> Code of the event at which a disk leaves the region searched so far, but stays in its cell. Its
+  !> contacts must then be searched anew. The code is `looks_again` - 1 if the disk leaves through
+  !> the right or upper edge, otherwise `looks_again`.
   integer(int32), parameter :: looks_again = first_crossing - n_sides
   integer(int32), parameter :: nothing = -huge(1_int32)
   character(len=6), parameter :: side_name(n_sides) = ["left  ", "right ", "bottom", "top   "]

@@ -452,7 +452,7 @@ contains
     mass = [(self%mass_of(i), i=1, self%n_disks())]
   end function masses
 
-  !> Sets the mass of each species to that of its heaviest disk, and deallocates the individual
+  !> Sets the mass of each species to the mass of its heaviest disk, and deallocates the individual
   !> masses if they are equal within each species.
   pure subroutine simplify_masses(self)
     class(simulation_t), intent(inout) :: self

@@ -148,8 +148,8 @@ contains
     if (collisions > max(longest_finite*int(disks, int64)**2, self%series(1))) self%series = [collisions, int(disks, int64)]
   end subroutine note_series
 
-  !> Adds the counters and sums of another tally with the same units: that of a domain, in which
-  !> series of simultaneous collisions are not examined.
+  !> Adds the counters and sums of another tally with the same units, which belongs to a domain.
+  !> Domains do not examine series of simultaneous collisions.
   pure subroutine include(self, other)
     class(tally_t), intent(inout) :: self
     type(tally_t), intent(in) :: other
