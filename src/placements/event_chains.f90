@@ -16,8 +16,8 @@
 !> a chain then includes the direction. Each state still has exactly one predecessor: a disk that
 !> touches a side and moves away from it must have been reflected just before. The initial direction
 !> is drawn at random, because the uniform distribution is stationary only if both directions are
-!> equally probable. Reversing a chain between two sides at its end leads back to its start, so such
-!> chains also satisfy detailed balance.
+!> equally probable. A chain between two sides, reversed at its end, leads back to its start. Such
+!> chains therefore also satisfy detailed balance.
 !>
 !> If the radii differ, a swap is attempted after each chain: two disks, drawn uniformly from all
 !> disks, exchange their positions unless the larger one would overlap another disk or a side
@@ -105,8 +105,8 @@ contains
     if (swapped(1) > 0) text = text//", "//written(swapped(2))//" of "//written(swapped(1))//" swaps of different radii accepted"
   end function report
 
-  !> Adds the disks to a packing with layers, within each of which the radii differ by less than a
-  !> factor of two.
+  !> Adds the disks to a packing with layers. Within a layer, the radii differ by less than a factor
+  !> of two.
   subroutine fill(packing, box, radius, x)
     type(packing_t), intent(out) :: packing
     type(box_t), intent(in) :: box

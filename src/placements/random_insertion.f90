@@ -2,13 +2,13 @@
 !> points where it fits between the disks inserted earlier. The region is divided into small
 !> rectangles called voxels. A voxel is eliminated if a single disk prevents the centre of a new
 !> disk from lying anywhere in it. Points are drawn only from the remaining voxels, which are halved
-!> along both axes when attempts fail too often. Attempts in eliminated voxels would always fail;
-!> the distribution is therefore that of simple insertion, but saturation can be reached (Zhang and
-!> Torquato, 2013, doi:10.1103/PhysRevE.88.053312).
+!> along both axes when attempts fail too often. Attempts in eliminated voxels would always fail.
+!> The distribution is therefore the same as in simple insertion, but saturation can be reached
+!> (Zhang and Torquato, 2013, doi:10.1103/PhysRevE.88.053312).
 !>
-!> Disks of different radii are inserted in the order of decreasing radius. For different radii no
-!> voxels are eliminated, because a voxel without space for one disk may have space for a smaller
-!> one, and the insertion ends after many failed attempts.
+!> Disks of different radii are inserted in the order of decreasing radius. For different radii the
+!> insertion ends after many failed attempts. No voxels are eliminated then, because a voxel without
+!> space for one disk may have space for a smaller one.
 module random_insertion
   use kinds, only: int32, real64
   use memory_hints, only: prefetch
@@ -133,7 +133,7 @@ contains
     end function place
 
     !> Prefetches data for future attempts: the voxel of the attempt drawn last, and the cells and
-    !> disks near the points of two earlier ones. Consecutive attempts access distant parts of
+    !> disks near the points of two earlier attempts. Consecutive attempts access distant parts of
     !> memory, so this saves time if the data exceed the cache.
     subroutine load_ahead()
       associate (far => coming(modulo(attempts - 1, drawn_ahead)), near => coming(modulo(attempts + 3, drawn_ahead)), &

@@ -19,7 +19,7 @@ module random_placement
     choice_t("placement", word, "Random sequential insertion: uniformly distributed positions without overlaps, up to a " &
       //"packing fraction of about 0.54.")]
 
-  !> Maximum of the number of attempts to place a species times the number of its disks.
+  !> Maximum number of attempts to place a species, multiplied by the number of its disks.
   integer(int32), parameter :: many_trials = 500000
   !> If an attempt placed n disks, another attempt is expected to place at most nearly*n + few.
   integer(int32), parameter :: few = 5
@@ -88,7 +88,7 @@ contains
     type(batch_t), intent(in) :: batch
     integer(int32), intent(in) :: placed       !! number of disks placed
     character(len=:), allocatable :: text
-    ! area of each disk divided by that of the region, in the order of placement
+    ! area of each disk divided by the area of the region, in the order of placement
     real(real64), allocatable :: part(:)
 
     allocate (part(size(batch%radius)))
