@@ -195,8 +195,8 @@ contains
     yes = iand(self%cell(c)%slot(count_slot), marked - crowd) > 0
   end function is_crowded_around
 
-  !> First disk in the linked list of a crowded cell, which also occupies the last slot; 0 if the
-  !> cell is not crowded.
+  !> First disk in the linked list of a crowded cell; 0 if the cell is not crowded. This disk also
+  !> occupies the last slot.
   pure function chain(self, c) result(i)
     class(cell_contents_t), intent(in) :: self
     integer(int32), intent(in) :: c

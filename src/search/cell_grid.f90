@@ -1,6 +1,6 @@
-!> Cell search (linked-cell method). The cells are at least one diameter wide, so that a disk can
-!> touch only the disks in the 3 x 3 cells around it until it leaves its own cell, which is an
-!> event. Wide cells overlap (see `cell_faces`).
+!> Cell search (linked-cell method). The cells are at least one diameter wide. A disk can therefore
+!> touch only the disks in the 3 x 3 cells around it, until it crosses a face of its cell. This
+!> crossing is an event. Wide cells overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, next_obstacle
@@ -96,7 +96,8 @@ contains
     end associate
   end subroutine build
 
-  !> Removes each disk from the cell in its tag. If all cells are empty then, `all_found` is .true.
+  !> Removes each disk from the cell whose number is stored with the disk. Afterwards `all_found` is
+  !> .true. if all cells are empty.
   subroutine clear_cells(self, sim, all_found)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -520,7 +521,7 @@ contains
     sim%tag(i)%partner_counter = sim%disk(max(near%partner, 1))%collision_counter
   end subroutine predict_with_care
 
-  !> Finds the next event of a big disk: a contact, or leaving the margin around its old position.
+  !> Finds when a big disk has its next contact, or leaves the margin around its old position.
   subroutine find_event_of_big(self, sim, known, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

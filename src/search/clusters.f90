@@ -179,8 +179,8 @@ contains
     end associate
   contains
 
-    !> Inverse mass of the disk shared by two contacts, with and without its sign; 0 if the contacts
-    !> share no disk.
+    !> Inverse mass of the disk shared by two contacts, first with the given sign and then without
+    !> it; 0 if the contacts share no disk.
     pure function term(i, j, sign)
       integer(int32), intent(in) :: i, j             !! numbers of the disks
       integer, intent(in) :: sign

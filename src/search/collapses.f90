@@ -21,15 +21,15 @@ module collapses
   private
   public :: still, watch
 
-  !> A collision is examined if the two disks have hardly moved since the later of their previous
-  !> events. In units of the sum of the radii, these are the maximum relative displacement and the
-  !> maximum decrease of the gap.
+  !> A collision is examined if the two disks have hardly moved relative to each other since the
+  !> later of their previous events. The first number is the maximum relative displacement, the
+  !> second the maximum decrease of the gap, both in units of the sum of the radii.
   real(real64), parameter :: still = 2.0_real64**(-14), negligible = 2.0_real64**(-33)
-  !> Minimum decrease of a gap, and minimum sliding velocity, that exceed the rounding errors, in
-  !> units of the spacing of the floating-point coordinates or velocities.
+  !> A decrease of a gap, or a sliding velocity, is larger than the rounding errors if it exceeds
+  !> this number of spacings of the floating-point coordinates or velocities.
   real(real64), parameter :: resolved = 4.0_real64
-  !> Maximum gap between neighbouring disks of a cluster, and between any disk of the cluster and
-  !> the colliding disks, in units of the sum of the radii.
+  !> Maximum gap between neighbouring disks of a cluster, and maximum gap between a disk of the
+  !> cluster and the colliding disks, in units of the sum of the radii.
   real(real64), parameter :: reach = 0.125_real64, farthest = 16.0_real64
 
 contains
@@ -115,7 +115,7 @@ contains
       end associate
     end subroutine begin
 
-    !> Adds a collision of the disks with the ids a and b to their series, which are merged.
+    !> Merges the series of the disks with the ids a and b, and adds their collision.
     subroutine unite(a, b)
       integer(int32), intent(in) :: a, b
       integer(int32) :: root, other

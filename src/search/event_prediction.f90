@@ -10,8 +10,8 @@ module event_prediction
   public :: event_t, prediction_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
 
   integer(int32), parameter :: list_capacity = 64
-  !> Guarantees given by the caller of `earliest_contact`; the sum of both flags gives both.
-  !> `latest_clock`: the clock of the disk is `now`, and no candidate has a later clock.
+  !> Guarantees given by the caller of `earliest_contact`. The sum of both flags gives both
+  !> guarantees. `latest_clock`: the clock of the disk is `now`, and no candidate has a later clock.
   !> `no_gravity`: no gravity acts on the disks. For each combination the compiler generates a
   !> version without unneeded operations.
   integer(int32), parameter :: latest_clock = 1, no_gravity = 2

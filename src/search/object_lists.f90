@@ -184,7 +184,7 @@ contains
 
   !> Boundary ids, in descending order, of the obstacles that reach into the given cells. If these
   !> are all cells into which a big disk reaches, the result includes every obstacle that the disk
-  !> can touch, because both reach into the cell of their point of contact.
+  !> can touch. Both objects reach into the cell of their point of contact.
   pure function obstacles_along(self, places) result(codes)
     class(object_lists_t), intent(in) :: self
     type(place_t), intent(in) :: places(:)
