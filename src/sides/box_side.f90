@@ -149,7 +149,7 @@ contains
     end if
   end subroutine follow
 
-  !> True if the side continues its motion of before a change.
+  !> True if the side continues the motion that it had before a change.
   elemental function continues(after, before) result(yes)
     type(side_t), intent(in) :: after, before
     logical :: yes

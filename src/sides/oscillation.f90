@@ -235,7 +235,7 @@ contains
     end function gap_rate
 
     !> Bisects an interval until `left` and `right` are adjacent floating-point numbers. At the time
-    !> `right` the gap increases if `to_smallest` is .true., and is negative otherwise.
+    !> `right` the gap increases if `to_smallest` is .true.; otherwise the gap is negative.
     pure subroutine bisect(to_smallest, left, right)
       logical, intent(in) :: to_smallest
       real(real64), intent(inout) :: left, right

@@ -187,7 +187,7 @@ contains
   end function is_piston
 
   !> Velocity change of a piston in a collision. The velocity change of the disk is smaller by this
-  !> amount than at infinite mass of the piston.
+  !> amount than for a piston of infinite mass.
   elemental function taken_from(self, change, mass) result(v)
     class(side_motion_t), intent(in) :: self
     !> Velocity change of the disk if the mass of the piston were infinite [length/time].
