@@ -97,7 +97,8 @@ contains
   end subroutine check_columns
 
   !> Checks that the obstacles fit into the box, and the disks of each species into their region.
-  !> Species whose number or size of disks is invalid, which has been reported, are skipped.
+  !> Species with an invalid number or size of disks are skipped, because this problem has already
+  !> been reported.
   subroutine check_fit(settings, groups, problems, running)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
@@ -161,9 +162,9 @@ contains
     if (allocated(radius)) extent = extent_t(pi*sum(radius**2), minval(radius), maxval(radius))
   end function extent_of
 
-  !> Reports a region whose packing fraction, including all species placed in it, would exceed a
-  !> proven upper bound. No method could place these disks, and some methods would try for a long
-  !> time. Given positions are not bound to a region.
+  !> Reports a region with a packing fraction above a proven upper bound. The packing fraction
+  !> includes all species placed in the region. No method could place these disks, and some methods
+  !> would try for a long time. Given positions are not bound to a region.
   pure subroutine check_packing(species, extent, groups, problems)
     type(species_settings_t), intent(in) :: species(:)
     type(extent_t), intent(in) :: extent(:)                   !! extent of each species
@@ -280,8 +281,8 @@ contains
 
   !> Determines whether the disks of a species rotate, and reads the number and radii of the disks
   !> from an initial-configuration file unless the input contains both. If the input contains both,
-  !> an unreadable file is not reported before the disks are placed, because a resumed run places no
-  !> disks and does not need the file.
+  !> an unreadable file is reported only when the disks are placed. A resumed run places no disks
+  !> and does not need the file.
   subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: k                                  !! index of the species

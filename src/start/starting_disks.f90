@@ -85,9 +85,9 @@ contains
     if (.not. allocated(me%in_file%error)) call fail(me%in_file%error, exit_usage, why)
   end subroutine refuse
 
-  !> Completes the table of disks with values from the input. Quantities missing in both are
-  !> reported, and also quantities given in both if the file is a text file. If the file is the
-  !> output of a run, the value in the input takes precedence.
+  !> Completes the table of disks with values from the input. Quantities missing from both the file
+  !> and the input are reported. Quantities given in both are reported if the file is a text file.
+  !> If the file is the output of a run, the value in the input takes precedence.
   subroutine join(me)
     type(species_settings_t), intent(inout) :: me
     logical :: wanted(radius_row:mass_row)
