@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 
-# Prints the path of the HDF5 compiler for Fortran (h5fc) for the Makefile. The candidates are all h5fc on PATH and then
-# /usr/bin/h5fc; the first one is used with which an HDF5 program compiles and runs. The h5fc of a conda environment, for
-# example, may call a compiler that is not installed. If no h5fc works, the script prints "h5fc" and exits with status 1.
+# Prints the path of the HDF5 compiler for Fortran (h5fc) for the Makefile. The candidates are all h5fc on PATH,
+# followed by /usr/bin/h5fc. The script prints the first candidate with which an HDF5 program compiles and runs. The
+# h5fc of a conda environment, for example, may call a compiler that is not installed. If no h5fc works, the script
+# prints "h5fc" and exits with status 1.
 set -u
 mapfile -t candidates < <(type -ap h5fc)
 # The h5fc of the system is not tested, because the test would double the time that make needs before it compiles.

@@ -277,7 +277,8 @@ contains
     if (session%sim%changes_made > 0) call fold_changes(input, session%sim%changes_made, session%sim%box, error)
   end subroutine input_in_force
 
-  !> Replaces the schedule of a simulation by that of an input, none of whose changes has been made.
+  !> Replaces the scheduled changes of a simulation by the changes of an input. None of these
+  !> changes has been made yet.
   subroutine take_schedule(input, sim)
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(inout) :: sim
@@ -525,8 +526,8 @@ contains
         do k = 1, size(groups(g)%values)
           if (.not. groups(g)%values(k)%is_set()) cycle
           most = most_written
-          ! Obstacles are written with all values, because the text does not describe obstacles read
-          ! from a file otherwise.
+          ! Obstacles are written with all values. The text would otherwise not describe obstacles
+          ! that were read from a file.
           if (any(obstacle_groups == groups(g)%name)) most = huge(most)
           call growing%add(groups(g)%value_line(k, most)//eol)
         end do

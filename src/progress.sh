@@ -12,7 +12,7 @@ announce() {
   (
     seconds=0 pattern='  ... %d s\n'
     if on_terminal; then pattern='\r  ... %d s'; fi
-    # Without the output of `sleep` closed, a pipe would stay open after the end.
+    # The output of `sleep` must be closed. Otherwise a pipe would stay open after the end.
     while sleep 5 >/dev/null 2>&1 && kill -0 "$self" 2>/dev/null; do
       seconds=$((seconds + 5))
       # shellcheck disable=SC2059

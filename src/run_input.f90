@@ -209,8 +209,9 @@ contains
     if (problems%count == 0) call check_entries(after, box%epoch + t, problems)
   end subroutine changed_input
 
-  !> Reports sources whose interval is too short for the entries up to a time to be counted exactly.
-  !> The check of the input includes only times that are known without a change.
+  !> Reports a source whose interval is too short, because its entries up to the time of a change
+  !> cannot be counted exactly. The check of the input tests only times that are known without a
+  !> change.
   subroutine check_entries(input, t, problems)
     type(run_input_t), intent(in) :: input
     real(real64), intent(in) :: t                                   !! time since the start [time]
