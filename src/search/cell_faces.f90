@@ -1,8 +1,9 @@
 !> Faces of the cells, including the sides of the box, and the times when disks cross them.
 !>
-!> Neighbouring cells overlap. The overlap is the largest for which two disks in contact are always
-!> in the same cell or in adjacent cells. A disk in an overlap is assigned to the cell that it will
-!> leave last. If the cells are much wider than the disks, this halves the number of cell crossings.
+!> Neighbouring cells overlap. The overlap is as large as possible under the condition that two
+!> disks in contact are always in the same cell or in adjacent cells. A disk in an overlap is
+!> assigned to the cell that it will leave last. If the cells are much wider than the disks, this
+!> halves the number of cell crossings.
 module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t

@@ -118,7 +118,7 @@ contains
     if (self%first(1) /= 1 .or. self%first(2) /= 1) cell = modulo(cell - self%first, self%whole) + 1
   end function cell_at
 
-  !> Converts a column or row number of the block to that of the grid of the whole box.
+  !> Converts a column or row number of the block to the number in the grid of the whole box.
   elemental function place_of(self, cell, axis) result(place)
     class(cell_layout_t), intent(in) :: self
     integer(int32), intent(in) :: cell

@@ -38,8 +38,8 @@ contains
     near%n = 0
   end subroutine test_list
 
-  !> Tests the candidates in `near`, all in the same periodic image of the box, and empties the
-  !> list.
+  !> Tests the candidates in `near`, which are all in the same periodic image of the box, and
+  !> empties the list.
   subroutine test_through_image(sim, known, image, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: known
@@ -59,7 +59,7 @@ contains
     near%n = 0
   end subroutine test_through_image
 
-  !> Finds contacts with given disks, all in the same periodic image of the box.
+  !> Finds contacts with given disks, which are all in the same periodic image of the box.
   subroutine scan_disks(sim, disks, image, known, near)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: disks(:)
@@ -113,7 +113,8 @@ contains
     if (near%n > 0) call test_disks()
   contains
 
-    !> Tests the big disks among the candidates, all in the same periodic image of the box.
+    !> Tests those candidates that are big disks. The candidates are all in the same periodic image
+    !> of the box.
     subroutine test_disks()
       if (all(last == 0)) then
         call test_list(sim, known, near)
@@ -148,7 +149,8 @@ contains
     end do
   end subroutine scan_list
 
-  !> Finds contacts with the disks in given cells, all in the same periodic image of the box.
+  !> Finds contacts with the disks in given cells, which are all in the same periodic image of the
+  !> box.
   subroutine scan_cells(cells, sim, c, images, number, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -241,9 +243,9 @@ contains
     end do
   end subroutine add_chains_around
 
-  !> Finds contacts of a disk near a periodic side, beyond which some of the 3 x 3 cells around it
-  !> lie. Cells of the same periodic image are searched together. A sheared box, whose images above
-  !> and below move along x, requires `scan_around_moving_seam` instead.
+  !> Finds contacts of a disk near a periodic side. Some of the 3 x 3 cells around this disk lie
+  !> beyond the side. Cells of the same periodic image are searched together. A sheared box, whose
+  !> images above and below move along x, requires `scan_around_moving_seam` instead.
   subroutine scan_around_seam(cells, layout, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(cell_layout_t), intent(in) :: layout
@@ -285,7 +287,7 @@ contains
       if (first < 0 .and. image(1) == image(first)) last = 1
     end function last_alike
 
-    !> Tests the disks in a block of cells, all in the same periodic image.
+    !> Tests the disks in a block of cells, which are all in the same periodic image.
     subroutine scan_block()
       integer(int64) :: n
       integer(int32) :: c, k, m, fullest

@@ -106,9 +106,9 @@ module neighbour_lists
 contains
 
   !> Allocates the neighbour lists if they are expected to save time. With lists, the prediction
-  !> after a collision tests fewer disks, but the lists must be renewed, more often at lower
-  !> densities. `least_candidates` and the width of the neighbourhoods were optimised for
-  !> polydisperse disks.
+  !> after a collision tests fewer disks. However, the lists must be renewed, and this is more
+  !> frequent at lower densities. `least_candidates` and the width of the neighbourhoods were
+  !> optimised for polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, layout)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -470,7 +470,7 @@ contains
     end do
   end subroutine find_cells
 
-  !> Index of the image of disk i that disk j can touch, where disk i can touch the image `image` of
+  !> Index of the image of disk i that disk j can touch, if disk i can touch the image `image` of
   !> disk j.
   elemental function reverse(image)
     integer(int32), intent(in) :: image
