@@ -15,8 +15,8 @@ module active
 
   character(len=*), parameter :: word = "active"
   type(choice_t), parameter :: choices(*) = [ &
-    choice_t("kind", word, "Active Brownian disks: as 'brownian', with an additional velocity (self_propulsion_speed) along " &
-      //"the orientation of the disk, which diffuses.")]
+    choice_t("kind", word, "Active Brownian disks: as 'brownian', but each kick also adds a velocity (self_propulsion_speed) " &
+      //"along the orientation of the disk. The orientation diffuses.")]
   type(variable_t), parameter :: rows(*) = [ &
     variable_t("drive", "self_propulsion_speed", "real", 1, "required", "1", &
       "Self-propulsion speed of active disks: each kick adds a velocity of this magnitude along the orientation of the disk.", &
@@ -26,9 +26,9 @@ module active
       "Rotational diffusion coefficient D_r of active disks: the variance of the orientation angle grows at the rate 2 D_r.", &
       not_negative, "1/time", goes_with="kind "//word, may_change=in_motion), &
     variable_t("drive", "turning_rate", "real", 1, "fallback", "0", &
-      "Constant rate, positive counter-clockwise, at which the orientation of active disks turns in addition to its " &
-      //"diffusion. Free disks then move on circles of radius self_propulsion_speed/turning_rate. Choose an interval well " &
-      //"below 1/turning_rate.", unit="1/time", goes_with="kind "//word, may_change=in_motion)]
+      "Constant rate at which the orientation of active disks turns, in addition to its diffusion; positive " &
+      //"counter-clockwise. Free disks then move on circles of radius self_propulsion_speed/turning_rate. Choose an interval " &
+      //"well below 1/turning_rate.", unit="1/time", goes_with="kind "//word, may_change=in_motion)]
 
   type, extends(brownian_t) :: active_t
     real(real64) :: speed = 0.0_real64           !! self-propulsion speed [length/time]

@@ -31,7 +31,8 @@ module drives
       choices="none "//kinds, may_change=in_motion), &
     variable_t("drive", "interval", "real", 1, "required", "0.01", &
       "Time between kicks. Unless the kicks themselves are studied, choose an interval well below the mean time between " &
-      //"collisions; with kind = 'recycle', one shorter than the time in which a disk crosses from_region.", positive, "time", &
+      //"collisions. With kind = 'recycle', choose an interval shorter than the time in which a disk crosses " &
+      //"from_region.", positive, "time", &
       goes_with="kind "//kinds, may_change=in_motion), &
     noise_rows, andersen_rows, &
     variable_t("drive", "temperature", "real", 1, "required", "1", &

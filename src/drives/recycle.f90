@@ -31,12 +31,13 @@ module recycle
       otherwise="none; velocity or temperature must be given where it applies"), &
     variable_t("drive", "from_region", "real", 4, "required", "0, 1, 0, 0.1", &
       "Region (xlo, xhi, ylo, yhi) from which disks are recycled. At all multiples of the time interval, each disk with its " &
-      //"centre in this region moves to a random free position in to_region, in the order of the ids. A disk for which none " &
-      //"of 100 random positions is free stays where it is until the next multiple.", &
+      //"centre in this region moves to a random free position in to_region, in the order of the ids. If none of 100 random " &
+      //"positions is free for a disk, it stays where it is until the next multiple.", &
       unit="length", goes_with="kind "//word, may_change=in_motion), &
     variable_t("drive", "to_region", "real", 4, "required", "0, 1, 0.9, 1", &
-      "Region (xlo, xhi, ylo, yhi) to which recycled disks move. They lie completely inside it, except along a periodic axis " &
-      //"that it spans. It must not overlap from_region, an obstacle or a straight wall.", &
+      "Region (xlo, xhi, ylo, yhi) to which recycled disks move. Recycled disks lie completely inside this region. Only " &
+      //"along a periodic axis that the region spans, they may overlap its edges. The region must not overlap from_region, " &
+      //"an obstacle or a straight wall.", &
       unit="length", goes_with="kind "//word, may_change=in_motion)]
 
   type, extends(drive_t) :: recycle_t

@@ -16,8 +16,8 @@ module collisions
   !> of all walls.
   type(choice_t), parameter :: meanings(*) = [ &
     choice_t("", "velocity", "Both components of the velocity are multiplied by the coefficient of restitution, and the " &
-      //"normal one is reversed. A single disk without gravity follows the same path as in elastic collisions, at decreasing " &
-      //"speed."), &
+      //"normal component is reversed. A single disk without gravity follows the same path as in elastic collisions, at " &
+      //"decreasing speed."), &
     choice_t("", "normal", "The normal component of the velocity is reversed and multiplied by the coefficient of " &
       //"restitution. The tangential component does not change (smooth wall), unless tangential_restitution makes the wall " &
       //"rough.")]

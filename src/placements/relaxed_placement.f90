@@ -18,8 +18,8 @@ module relaxed_placement
   character(len=*), parameter :: word = "relaxed", sweeps = "relaxation_sweeps"
   type(choice_t), parameter :: choices(*) = [ &
     choice_t("placement", word, "Dense equilibrium state: a lattice, or a packing as with 'dense', equilibrated by " &
-      //"event-chain Monte Carlo with swaps of disks of different radii. All species must use it, in a box without obstacles, " &
-      //"moving sides and gravity. Skipped by --check.")]
+      //"event-chain Monte Carlo with swaps of disks of different radii. All species must use this placement. The box must " &
+      //"have no obstacles, no moving sides and no gravity. The option --check skips this placement.")]
   type(variable_t), parameter :: rows(*) = [ &
     variable_t("species", sweeps, "integer", 1, "fallback", "1000", &
       "Number of sweeps of event-chain Monte Carlo that equilibrate the initial state with placement = 'relaxed'. A sweep of " &

@@ -29,11 +29,11 @@ module boundary_variables
       "Side of the box to which the group applies; it must be a wall (box.boundary). Each side has at most one group.", &
       choices="left right bottom top"), &
     variable_t("side", "open", "logical", 1, "default", ".false.", &
-      "Open side: a disk leaves the box when its centre reaches the side. It then waits outside until a source (&source) lets " &
-      //"it in again. While the initial state is generated, the side counts as a wall. Its collision rule acts only while it " &
-      //"is closed. An open side cannot move. In a running simulation sides can be opened or closed if the input has a " &
-      //"source, waiting disks, a &change of open, or a side with this variable; a side cannot be closed while a disk " &
-      //"overlaps it.", may_change=in_motion), &
+      "Open side: a disk leaves the box when its centre reaches the side. It then waits outside until a source (&source) " &
+      //"lets it in again. While the initial state is generated, the side counts as a wall. The collision rule of the side " &
+      //"acts only while the side is closed. An open side cannot move. Sides can be opened or closed in a running simulation " &
+      //"if the input contains a source, waiting disks, a &change of open, or a side with this variable. A side cannot be " &
+      //"closed while a disk overlaps it.", may_change=in_motion), &
     motion_rows]
 
   type(variable_t), parameter :: obstacle_rows(*) = [ &
@@ -61,8 +61,8 @@ module boundary_variables
     variable_t("obstacle", "file", "text", 1, "optional", "'scatterers.txt'", &
       "File with many circles, given instead of centre and radius: a text file with a line of column names (x y radius) and " &
       //"one line per circle, or an HDF5 file (.h5) with the datasets centre and radius. Up to 1000000 circles form a single " &
-      //"obstacle, with one collision rule and one set of observables. With from_angle and to_angle they are arcs, all " &
-      //"between the same two angles. The path is relative to the folder in which the program is started.", &
+      //"obstacle, with one collision rule and one set of observables. With from_angle and to_angle, each circle is replaced " &
+      //"by an arc between these two angles. The path is relative to the folder in which the program is started.", &
       excludes="centre radius", &
       otherwise="none; the group describes one circle")]
 
@@ -92,9 +92,9 @@ module boundary_variables
   !> Contact-law variables, which the groups `&side`, `&obstacle` and `&wall` have in common.
   type(variable_t), parameter :: law_rows(*) = [ &
     variable_t("", "restitution", "real", 1, "optional", "0.9", &
-      "Coefficient of restitution of disks colliding with this boundary: 1 is elastic, 0 perfectly inelastic. Whether it " &
-      //"applies to both components of the velocity or to the normal one alone depends on the rule. Not available for a " &
-      //"thermal boundary (temperature).", unit_interval, &
+      "Coefficient of restitution of disks colliding with this boundary: 1 is elastic, 0 perfectly inelastic. The rule " &
+      //"determines whether it applies to both components of the velocity or only to the normal component. Not available for " &
+      //"a thermal boundary (temperature).", unit_interval, &
       may_change=in_motion, otherwise="contact.wall_restitution"), &
     variable_t("", "rule", "text", 1, "optional", "'normal'", &
       "Collision rule of this boundary. Not available for a thermal boundary (temperature).", choices=wall_rules, &

@@ -48,8 +48,8 @@ module choices
     choice_t("velocities", "uniform", "Both components are uniformly distributed between -speed and speed."), &
     choice_t("velocities", "maxwell", "Velocities are drawn from the Maxwell distribution with kT = temperature."), &
     choice_t("velocities", "explicit", "Velocities listed in velocity."), &
-    choice_t("velocities", "file", "Velocities in the initial-configuration file (file), and angular velocities if it has " &
-      //"them."), &
+    choice_t("velocities", "file", "Velocities in the initial-configuration file (file), and angular velocities if the file " &
+      //"contains them."), &
     law_choices, &
     drive_choices, &
     (choice_t("frame_columns", all_columns(k)%name, all_columns(k)%meaning), k=1, size(all_columns)), &

@@ -17,13 +17,13 @@ module disk_variables
       "Number of disks of the species.", count_of_disks, &
       otherwise="follows from grid, position or file; needed without these"), &
     variable_t("species", "waiting", "integer", 1, "default", "0", &
-      "Number of disks waiting outside the box at the start, the last ones of the species. Initial positions and velocities " &
-      //"are those of the other disks. Waiting disks enter through a source (&source). They count in the packing fraction. " &
-      //"With an initial-configuration file (file), mass and radius must also be given.", not_negative), &
+      "Number of disks waiting outside the box at the start: the last disks of the species. Only the other disks have " &
+      //"initial positions and velocities. Waiting disks enter through a source (&source). The packing fraction includes " &
+      //"them. With an initial-configuration file (file), mass and radius must also be given.", not_negative), &
     variable_t("species", "mass", "real", 1, "default", "1", &
-      "Mass of each disk. With relative_to, a multiple of the mass of the other species. With mass_scaling = 'area', the mass " &
-      //"of a disk with the mean radius. If mass is not given, masses are read from the initial-configuration file (file), " &
-      //"provided that it has them.", &
+      "Mass of each disk. With relative_to, a multiple of the mass of the other species. With mass_scaling = 'area', the " &
+      //"mass of a disk with the mean radius. If mass is not given, masses are read from the initial-configuration file " &
+      //"(file), provided that the file contains masses.", &
       positive, "mass"), &
     variable_t("species", "radius", "real", 1, "example", "0.01", &
       "Radius of each disk; mean radius of a polydisperse species. With relative_to, a multiple of the radius of the other " &
@@ -48,12 +48,12 @@ module disk_variables
       //"(file).", &
       spread_of_radii, goes_with="radius_distribution uniform gaussian lognormal"), &
     variable_t("species", "mass_scaling", "text", 1, "fallback", "'equal'", &
-      "Dependence of the mass of a disk on its radius in a polydisperse species.", choices="equal area", &
+      "Dependence of the mass of a disk on its radius, in a polydisperse species.", choices="equal area", &
       goes_with="radius_distribution uniform gaussian lognormal"), &
     variable_t("species", "relative_to", "text", 1, "optional", "'bed'", &
       "Species relative to which mass and radius are given: with relative_to = 'bed', mass = 25 means 25 times the mass of a " &
-      //"disk of the species 'bed'. If that species is polydisperse, its mean radius counts. Its radii must not be read from " &
-      //"an initial-configuration file.", &
+      //"disk of the species 'bed'. If that species is polydisperse, radius is relative to its mean radius. Its radii must " &
+      //"not be read from an initial-configuration file.", &
       otherwise="none; mass and radius are absolute values"), &
     variable_t("species", "region", "real", 4, "optional", "0, 1, 0, 0.5", &
       "Rectangle (xlo, xhi, ylo, yhi) inside which the disks lie at the start. They may leave it later.", unit="length", &
@@ -102,8 +102,8 @@ module disk_variables
       choices=restitution_laws, may_change=in_motion), &
     variable_t("contact", "reference_speed", "real", 1, "required", "1", &
       "Reference value g0 of the impact speed. Above g0 the coefficients of restitution have the values in the input; below " &
-      //"it they are closer to 1, or equal to 1 with restitution_law = 'elastic_below'. Choose g0 above the impact speeds " &
-      //"that occur for 'power' and 'viscoelastic', and well below them for 'elastic_below'.", &
+      //"g0 they are closer to 1, or equal to 1 with restitution_law = 'elastic_below'. With 'power' and 'viscoelastic', " &
+      //"choose g0 above the impact speeds that occur; with 'elastic_below', choose g0 well below them.", &
       positive, "length/time", goes_with="restitution_law power viscoelastic elastic_below", may_change=in_motion), &
     variable_t("contact", "wall_rule", "text", 1, "default", "'velocity'", &
       "Collision rule of sides and obstacles, except thermal boundaries and boundaries with a rule of their own (rule in " &

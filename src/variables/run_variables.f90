@@ -29,10 +29,10 @@ module run_variables
       "Priority queue of the predicted events. Both queues give bit-identical trajectories; 'heap' exists for comparison. No " &
       //"effect with run.dynamics = 'steps'.", choices="calendar heap", may_change=on_resume), &
     variable_t("run", "threads", "integer", 1, "default", "0", &
-      "Largest number of threads (cores) of the run. With 0 it is the value of the environment variable OMP_NUM_THREADS, or 1 " &
-      //"if that is not set. The trajectory is bit-identical for any number of threads. Small systems, sheared boxes, open " &
-      //"systems, boxes with a piston, and runs with run.dynamics = 'steps' or run.search other than 'cells' use a single " &
-      //"thread.", &
+      "Largest number of threads (cores) of the run. With 0 the number is read from the environment variable " &
+      //"OMP_NUM_THREADS; if this variable is not set, the number is 1. The trajectory is bit-identical for any number of " &
+      //"threads. Small systems, sheared boxes, open systems, boxes with a piston, and runs with run.dynamics = 'steps' or " &
+      //"run.search other than 'cells' use a single thread.", &
       number_of_threads, &
       may_change=on_resume)]
 
@@ -41,8 +41,9 @@ module run_variables
       "Name of the change in messages and in --set change.NAME.VARIABLE=VALUE: up to 40 letters, digits, _ and -. The names " &
       //"of all changes must differ.", may_change=on_resume, otherwise="1, 2, ... in the order of the file"), &
     variable_t("change", "time", "real", 1, "example", "1", &
-      "Time of the change, which takes place after the collisions and before the kicks and samples of the same time; with " &
-      //"run.dynamics = 'steps', at the end of the step that contains this time. Times after the end of the run are allowed.", &
+      "Time of the change. The change takes place after the collisions and before the kicks and samples of the same time. " &
+      //"With run.dynamics = 'steps', it takes place at the end of the step that contains this time. Times after the end of " &
+      //"the run are allowed.", &
       positive, "time", may_change=on_resume), &
     variable_t("change", "set", "text", 0, "example", "'box.gravity=0, -1'", &
       "Variables to change and their new values, each in quotes and written as for the option --set: GROUP.VARIABLE=VALUE or " &
@@ -67,10 +68,10 @@ module run_variables
       //"open sides.", &
       not_negative, may_change=on_resume, otherwise="no limit"), &
     variable_t("stop", "disks_inside", "integer", 1, "optional", "0", &
-      "Number of disks in the box at which the run ends. It ends when a disk leaves through an open side (side.open) and at " &
-      //"most this number remains.", not_negative, may_change=on_resume, otherwise="no limit"), &
+      "Number of disks in the box at which the run ends. The run ends when a disk leaves through an open side (side.open) " &
+      //"and at most this number of disks remains.", not_negative, may_change=on_resume, otherwise="no limit"), &
     variable_t("stop", "energy_fraction", "real", 1, "optional", "0.1", &
-      "Fraction of the initial kinetic energy at which the run ends. The energy that counts is the initial kinetic energy " &
+      "Fraction of the initial kinetic energy at which the run ends. The remaining energy is the initial kinetic energy " &
       //"minus all energy dissipated in collisions. Needs inelastic collisions or a second stop rule. Not available with " &
       //"driving, with shear, or with thermal, sliding or moving boundaries.", &
       energy_left, may_change=on_resume, otherwise="no limit"), &
@@ -81,8 +82,8 @@ module run_variables
       may_change=on_resume, &
       otherwise=".false.: disks at rest do not end the run"), &
     variable_t("stop", "wall_clock", "real", 1, "optional", "3600", &
-      "Wall-clock time after which the run stops with a checkpoint and exit code 75. The same command with --resume continues " &
-      //"it.", positive, "s", may_change=on_resume, otherwise="no limit")]
+      "Wall-clock time after which the run stops with a checkpoint and exit code 75. The same command with --resume " &
+      //"continues the run.", positive, "s", may_change=on_resume, otherwise="no limit")]
 
   type(variable_t), parameter :: output_rows(*) = [ &
     variable_t("output", "frames_every_time", "real", 1, "optional", "0.1", &

@@ -13,11 +13,12 @@ module source_variables
       "Species whose waiting disks enter the box. Disks wait from the start (species.waiting) or after leaving the box " &
       //"through an open side (side.open).", otherwise="the only species; needed with several species"), &
     variable_t("source", "region", "real", 4, "optional", "0, 1, 0.9, 1", &
-      "Region (xlo, xhi, ylo, yhi) in which disks enter, at random free positions. They lie completely inside the region, " &
-      //"except along a periodic axis that it spans. Open sides count as walls. If none of 100 random positions is free for a " &
-      //"disk, the next disk is tried.", unit="length", otherwise="the whole box"), &
+      "Region (xlo, xhi, ylo, yhi) in which disks enter, at random free positions. Entering disks lie completely inside the " &
+      //"region. Only along a periodic axis that the region spans, they may overlap its edges. Open sides count as walls. If " &
+      //"none of 100 random positions is free for a disk, the source tries the next " &
+      //"disk.", unit="length", otherwise="the whole box"), &
     variable_t("source", "interval", "real", 1, "example", "0.1", &
-      "Time between two actions of the source: at all multiples of the interval from start_time to end_time, the waiting " &
+      "Time between two actions of the source. At all multiples of the interval from start_time to end_time, the waiting " &
       //"disks with the lowest ids enter. Several sources act in the order of the file. Not available with drive.kind = " &
       //"'recycle'.", positive, "time", may_change=in_motion), &
     variable_t("source", "count", "integer", 1, "default", "1", &
