@@ -183,7 +183,7 @@ contains
   end function host_name
 
   !> Renames a file atomically and replaces an existing file of the new name. `moved` is .true. even
-  !> if the folder cannot be synchronised with the disk afterwards; in this case only a crash of the
+  !> if the folder cannot be synchronised with the disk afterwards. In this case a crash of the
   !> operating system could undo the renaming.
   subroutine move_file(from, to, moved)
     character(len=*), intent(in) :: from, to
