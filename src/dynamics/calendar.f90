@@ -3,7 +3,7 @@
 !> are divided into spans of many windows, each with an unordered list of events.
 !>
 !> New entries are appended at the end, which accesses few cache lines. Entries of a particular disk
-!> are never searched for, and single entries are never removed. All lists share one array, divided
+!> are never searched for, and entries are never removed singly. All lists share one array, divided
 !> into chunks; the chunks of a list are reused once its span has been processed.
 module calendar
   use kinds, only: int32, real64
@@ -14,8 +14,8 @@ module calendar
 
   integer(int32), parameter :: bucket_capacity = 15
   !> Intended mean number of events in a window. With fewer events, more empty windows would have to
-  !> be processed; with more, the small buckets would overflow more often, and more events would be
-  !> stored in the heap.
+  !> be processed. With more events, the small buckets would overflow more often, and more events
+  !> would be stored in the heap.
   real(real64), parameter :: events_per_window = 4.0_real64
   !> Number of disks up to which nearly all events fit into buckets.
   integer(int32), parameter :: few_disks = 5000
@@ -227,8 +227,8 @@ contains
 
   !> Lists disks that probably have events in the next windows, for one stage of prefetching. Each
   !> stage lists the disks of a window exactly once. The first stage is farthest ahead of the
-  !> current window; later stages are closer and omit disks whose entries have meanwhile become
-  !> invalid.
+  !> current window. Later stages are closer, and omit disks whose entries have become invalid since
+  !> then.
   subroutine list_coming(self, tag, window, stage, n, disks)
     class(calendar_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)

@@ -1,6 +1,6 @@
 !> Divides a run into epochs. At the end of an epoch the time origin moves, and the state is tested
-!> for an inelastic collapse. The time and the result of the test depend only on the state of the
-!> simulation, and not on the search, the queue or the number of threads.
+!> for an inelastic collapse. The time of the test and its result depend only on the state of the
+!> simulation. They do not depend on the search, the queue or the number of threads.
 module epochs
   use box_sides, only: bounds, next_side, separate_from_sides
   use encounters, only: is_passage
@@ -245,10 +245,9 @@ contains
   end function stands_still
 
   !> True if all disks under gravity are at rest at the end of an epoch. The test is made only at
-  !> the end of an epoch, so that the result does not depend on when the caller pauses. The whole
-  !> epoch must consist of unresolved bounces, because a ball whose bounces still converge must
-  !> execute all of them. If the disks are at rest at the end of an epoch, the run ends in this
-  !> state.
+  !> the end of an epoch, so that the result does not depend on when the caller pauses. All bounces
+  !> in the epoch must be unresolved, because a ball with converging bounces must first execute all
+  !> of them. If the disks are at rest at the end of an epoch, the run ends in this state.
   pure function has_come_to_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes

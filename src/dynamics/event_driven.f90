@@ -105,8 +105,8 @@ contains
   end subroutine renew
 
   !> Predicts the events of all disks, whose clocks must be equal. If the next kick changes all
-  !> velocities, later events will never occur. These events are left out of the queue, except the
-  !> earliest one, because the queue must not be empty.
+  !> velocities, later events will never occur. These events are left out of the queue. Only the
+  !> earliest of them is kept, because the queue must not be empty.
   subroutine renew_all(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -335,10 +335,10 @@ contains
     sim%disk(i)%partner = nothing
   end subroutine forget_events
 
-  !> Updates predicted events after a collision has changed the motion of a piston. Affected are
-  !> disks that were to collide with the piston next, and disks that the piston now reaches before
-  !> their next event. The event loop then returns, because the piston may leave its strip of cells
-  !> (see `piston_strips`) earlier than expected.
+  !> Updates predicted events after a collision has changed the motion of a piston. The procedure
+  !> updates disks that were to collide with the piston next, and disks that the piston now reaches
+  !> before their next event. The event loop then returns, because the piston may leave its strip of
+  !> cells (see `piston_strips`) earlier than expected.
   subroutine follow_side(self, sim, side)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -389,7 +389,7 @@ contains
   end subroutine take_from_heap
 
   !> Moves the events of the next span to their buckets. If the windows have proved far too narrow
-  !> or too wide, all events are entered anew with another width.
+  !> or too wide, all events are entered into the queue again with another width.
   subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)

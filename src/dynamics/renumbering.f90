@@ -14,10 +14,10 @@ module renumbering
 
 contains
 
-  !> Sorts the disks by the cells of a grid with about one disk per cell, and the cells by square
-  !> tiles, so that the disks in a region of space occupy few memory pages. Disks in the same cell
-  !> keep their order. The new order depends only on the state, and not on the search or the queue.
-  !> The ids of the disks (`tag%id`) do not change.
+  !> Sorts the disks by the cells of a grid with about one disk per cell. The cells are sorted by
+  !> square tiles, so that the disks in a region of space occupy few memory pages. Disks in the same
+  !> cell keep their order. The new order depends only on the state, and not on the search or the
+  !> queue. The ids of the disks (`tag%id`) do not change.
   subroutine renumber(sim)
     type(simulation_t), intent(inout) :: sim
     type(grid_t) :: cells

@@ -4,8 +4,8 @@
 !> Inelastic disks in a periodic box would cool for ever. Such a run ends when rounding errors
 !> dominate the temperature. The test is made at the start of epochs, so that the end of the run
 !> depends only on the trajectory. The present kinetic energy is compared with the kinetic energy at
-!> the time when the velocities were last set, which determines the magnitude of the rounding
-!> errors.
+!> the time when the velocities were last set. The latter energy determines the magnitude of the
+!> rounding errors.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use entries, only: awaits_entry
@@ -68,8 +68,9 @@ contains
     if (settings%energy_fraction > 0) rule%limits%dissipated = (1 - settings%energy_fraction)*sim%start_energy
   end function new_stop_rule
 
-  !> A real number of collisions, rounded up to an integer, or down if it exceeds an integer only by
-  !> rounding errors. The result is huge(n) if the number exceeds the range of 64-bit integers.
+  !> A real number of collisions, rounded up to an integer. If the number exceeds an integer only by
+  !> rounding errors, it is rounded down. The result is huge(n) if the number exceeds the range of
+  !> 64-bit integers.
   pure function whole_collisions(number) result(n)
     real(real64), intent(in) :: number
     integer(int64) :: n

@@ -285,8 +285,8 @@ contains
 
   !> Warning about the length of the step; empty if it is suitable. The maximum speed under gravity
   !> is estimated as v0 + sqrt(2 g L), for the fastest disk falling through the whole box of length
-  !> L. Without the TC model, a disk under gravity that dissipates energy in every step of a lasting
-  !> contact sinks by up to g dt**2/2 per step.
+  !> L. Under gravity a disk can stay in contact with a surface for many steps. Without the TC model
+  !> it then dissipates energy in every step, and sinks by up to g dt**2/2 per step.
   pure function warning(self, sim) result(text)
     class(time_stepped_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

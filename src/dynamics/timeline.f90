@@ -256,9 +256,9 @@ contains
     if (s > 0) t = evolution%pause_at(entry_time(sim, s))
   end function next_entry
 
-  !> Index of the source that acts next; at equal times, the first in the file; 0 if no source will
-  !> act any more. With time steps, all sources due within a step act at its end, in the order of
-  !> the file.
+  !> Index of the source that acts next; 0 if no source will act any more. Of several sources that
+  !> act at the same time, the first in the file is chosen. With time steps, all sources due within
+  !> a step act at its end, in the order of the file.
   pure function next_source(evolution, sim) result(next)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim

@@ -156,7 +156,7 @@ contains
   end subroutine mark_overlaps
 
   !> Adds the pairs of close disks. The partners of a disk are searched for among smaller disks, and
-  !> among equal disks with higher indices, so that the search for a small disk covers few bins,
+  !> among equal disks with higher indices. The search for a small disk then covers few bins,
   !> however large the largest disk is. The grid of bins is treated as periodic along both axes.
   !> Disks at opposite walls are nevertheless not paired, because their true distance is too large.
   subroutine list_disks(self, sim, x, bins)
