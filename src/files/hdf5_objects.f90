@@ -185,8 +185,8 @@ contains
     if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
   end function product_of
 
-  !> Writes values from a memory address to a part of an open dataset, or reads values from there
-  !> into memory. HDF5 may buffer small amounts of written values until `flush`.
+  !> Writes values from a memory address to a part of an open dataset, or reads values from this
+  !> part into memory. HDF5 may buffer small amounts of written values until `flush`.
   subroutine transfer(self, dataset, first, counts, type, address, writing)
     class(hdf5_file_t), intent(inout) :: self
     integer(hid_t), intent(in) :: dataset
