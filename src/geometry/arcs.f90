@@ -270,8 +270,8 @@ contains
 
   !> Sufficient test of whether the arc excludes the centres of disks from a whole rectangle: a disk
   !> in the middle of the rectangle overlaps the arc by more than half the diagonal of the
-  !> rectangle. For a large rectangle the result may be .false. although the arc excludes it
-  !> completely.
+  !> rectangle. For a large rectangle the result may be .false. although no disk can be centred in
+  !> the rectangle.
   pure function covers(self, d, half, radius) result(yes)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: d(2), half(2), radius

@@ -11,7 +11,7 @@ module free_flight
   real(real64), parameter :: negligible_speed = 1/never
 
   !> Relative safety margin of tests that rule out contacts; larger than all rounding errors. Such a
-  !> test never rules out a contact that occurs, but may fail to rule out a contact that does not
+  !> test never rules out a contact that occurs. It may fail to rule out a contact that does not
   !> occur.
   real(real64), parameter :: spare = 1.0e-6_real64
   !> Maximum number of times that a time interval is halved to find a lower bound of the distance in
@@ -260,8 +260,8 @@ contains
     bound = scale(2.0_real64, power)
   end function root_bound
 
-  !> Root of a cubic polynomial between lo and hi, where it must change sign exactly once, found by
-  !> bisection to the last bit.
+  !> Root of a cubic polynomial between lo and hi, found by bisection to the last bit. The
+  !> polynomial must change sign exactly once between lo and hi.
   pure function root_between(cubic, lo, hi) result(s)
     real(real64), intent(in) :: cubic(0:3), lo, hi
     real(real64) :: s, left, right

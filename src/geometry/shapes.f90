@@ -84,7 +84,7 @@ module shapes
 
     !> True if the obstacle certainly excludes the centres of disks from the whole rectangle d +-
     !> half. If rounding errors make this uncertain, the result is .false.; for a single point (half
-    !> = 0) it is exact.
+    !> = 0) the result is exact.
     pure function covers(self, d, half, radius) result(yes)
       import :: real64, shape_t
       class(shape_t), intent(in) :: self
