@@ -250,8 +250,8 @@ contains
     end associate
   end subroutine demand
 
-  !> Infers choices, such as `placement = 'grid'`, from the other variables: if a variable that has
-  !> an effect only with one choice (such as `grid`) is set, this choice is implied. If several
+  !> Infers choices, such as `placement = 'grid'`, from the other variables. A choice is implied if
+  !> a variable is set that has an effect only with this choice, such as `grid`. If several
   !> variables imply different choices, the last variable in the table takes precedence.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self

@@ -196,8 +196,8 @@ contains
     end do
   end subroutine share_variable
 
-  !> Determines the masses and radii of all species. If a species is relative to a second one, which
-  !> is relative to a third, the factors are multiplied.
+  !> Determines the masses and radii of all species. If a species is relative to a second species,
+  !> and this one is relative to a third, the factors are multiplied.
   subroutine resolve_sizes(groups, seed, species, problems)
     type(group_t), intent(in) :: groups(:)
     integer(int64), intent(in) :: seed
@@ -245,9 +245,9 @@ contains
     species%mean_radius = species%radius
   end subroutine resolve_sizes
 
-  !> Determines the radius of a species from one of three values: the radius itself, the factor
-  !> relative to the radius of another species (with `relative_to`), or the packing fraction. The
-  !> result is 0 if the radius is unknown.
+  !> Determines the radius of a species from one of three values: the radius itself, the packing
+  !> fraction, or (with `relative_to`) the ratio to the radius of another species. The result is 0
+  !> if the radius is unknown.
   subroutine find_radius(group, s, number, seed, radius, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s

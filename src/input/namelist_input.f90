@@ -524,8 +524,8 @@ contains
     if (element > 0) name = name(:bracket - 1)
   end subroutine split_element
 
-  !> If an override sets a sampling interval, removes any interval of another kind that the file
-  !> sets for the same samples. The override thereby replaces the interval in the file.
+  !> Removes the sampling interval that the file sets, if an override sets an interval of another
+  !> kind for the same samples. The override then replaces it.
   subroutine replace_cadence(self, g, name)
     class(reader_t), intent(inout) :: self
     integer, intent(in) :: g                            !! index of the group
