@@ -3,9 +3,9 @@
 !>
 !> During a run the output file has two slots, each with space for one checkpoint; one of them is
 !> valid. A new checkpoint and its checksum are written to the other slot. Once they are on disk, a
-!> number in the file is changed to make this slot the valid one, so the file always contains a
-!> complete checkpoint. The output of a finished run has one slot; the output of an aborted run
-!> contains no valid checkpoint.
+!> number in the file is changed, which makes this slot the valid one. The file therefore always
+!> contains a complete checkpoint. The output of a finished run has one slot; the output of an
+!> aborted run contains no valid checkpoint.
 module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int64
@@ -44,8 +44,9 @@ module checkpoint
 
 contains
 
-  !> Identification of the program that can resume the run: the version of the checkpoint layout,
-  !> and those compiler flags that allow inexact arithmetic and can therefore change results.
+  !> Identification of the program that can resume the run. It consists of the version of the
+  !> checkpoint layout, and of those compiler flags that allow inexact arithmetic and can therefore
+  !> change results.
   pure function program() result(text)
     character(len=:), allocatable :: text
 
@@ -350,10 +351,10 @@ contains
     call progress%schedule%look_ahead(sim)
   end subroutine read_checkpoint
 
-  !> Reports an error if the scheduled changes before the checkpoint differ from those that the run
-  !> has made, or if a later change has a time that has already passed. With time steps, a change
-  !> within a step is made at the end of the step. A run saved within this step has not made the
-  !> change yet.
+  !> Reports an error if the scheduled changes before the checkpoint differ from the changes that
+  !> the run has made, or if a later change is due at a time that has already passed. With time
+  !> steps, a change within a step is made at the end of the step. A run saved within this step has
+  !> not made the change yet.
   subroutine check_changes(evolution, sim, path, error)
     class(evolution_t), intent(in) :: evolution
     type(simulation_t), intent(in) :: sim

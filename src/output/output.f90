@@ -4,7 +4,7 @@
 !>
 !> The layout of an output file never changes after its creation. If the number of samples is known
 !> at the start, the file has exactly the space required. If the number is unknown, a full file is
-!> replaced by a larger one, by an atomic renaming; at the end of the run the file is replaced by a
+!> replaced by a larger one in an atomic renaming. At the end of the run the file is replaced by a
 !> copy without unused space.
 module output
   use kinds, only: int64, never, real64
