@@ -1,7 +1,7 @@
 !> Compares and corrects ghosts (copies of disks owned by neighbouring domains) after each time
-!> window. A ghost is wrong if it moved differently from its original. If a disk owned by the domain
-!> can have touched a wrong ghost, the window is invalid; otherwise the wrong ghosts are corrected.
-!> The page docs/explanation/algorithm.md proves that this criterion is sufficient.
+!> window. A ghost is wrong if its motion differed from the motion of its original. If a disk owned
+!> by the domain can have touched a wrong ghost, the window is invalid; otherwise the wrong ghosts
+!> are corrected. The page docs/explanation/algorithm.md proves that this criterion is sufficient.
 module domain_borders
   use kinds, only: int16, int32, int64
   use domains, only: correction_t, domain_t, forever, list_ghosts, slot_of_ghost

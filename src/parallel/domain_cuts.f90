@@ -68,8 +68,8 @@ contains
   contains
 
     !> Chooses the number of slabs and the number of domains in each slab. The estimated work is
-    !> minimised under two conditions: the total number of domains is not much smaller than
-    !> `wanted`, and no domain is too narrow.
+    !> minimised under two conditions. The total number of domains must not be much smaller than
+    !> `wanted`, and no domain must be too narrow.
     pure function numbers() result(n)
       integer(int32) :: n(2), most(2), columns, rows
 

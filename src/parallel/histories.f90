@@ -1,7 +1,8 @@
 !> Records the motion of the disks in one domain during the present time window of a parallel run.
 !> The history of a disk consists of the range of cells that it visited and a digest (hash) of its
 !> collisions. After the window, histories show whether each ghost moved in the same way as its
-!> original in the domain that owns it. The module also determines which domain counts a collision.
+!> original in the domain that owns it. The module also determines in which domain a collision is
+!> counted.
 module histories
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int16, int32, int64, real64

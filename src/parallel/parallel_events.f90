@@ -206,8 +206,8 @@ contains
   end function most_windows_now
 
   !> Lengthens the windows after a call in which all were valid. Within a call the length is
-  !> constant. If the length grew, the last window of every call could be invalid. One invalid
-  !> window invalidates all windows of a call, so the run would make no progress.
+  !> constant. A growing length could make the last window of every call invalid. Since one invalid
+  !> window invalidates all windows of a call, the run would then make no progress.
   pure subroutine lengthen_windows(self, windows)
     class(parallel_events_t), intent(inout) :: self
     integer, intent(in) :: windows               !! number of windows in the last call
@@ -234,8 +234,8 @@ contains
 
   !> Selects the serial engine for a period. The period is twice as long as the previous one, unless
   !> the domains have meanwhile executed more events than the serial engine executed in the previous
-  !> period. Owing to this doubling, a run unsuitable for domains takes hardly longer than with the
-  !> serial engine alone.
+  !> period. Owing to this doubling, a run that is unsuitable for domains takes hardly longer than
+  !> on the serial engine alone.
   subroutine use_serial_engine(self, sim, periods)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

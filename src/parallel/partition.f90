@@ -142,7 +142,7 @@ contains
   !> `longest_call` has passed. A window ends early if the number of events or collisions reaches
   !> its limit. `good` is .true. if all windows are valid.
   !>
-  !> The threads wait for each other twice per window: all domains must have reached the end of the
+  !> The threads wait for each other twice per window. All domains must have reached the end of the
   !> window before they are compared, and all comparisons must be complete before any state is
   !> changed.
   subroutine run_windows(self, sim, limits, most, t, windows, good)
