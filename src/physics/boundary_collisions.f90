@@ -60,7 +60,7 @@ contains
     if (counts) call add_wall_sums(sim, i, k, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
 
-  !> Ends a sequence of bounces on a moving side, which could otherwise be infinite: once a
+  !> Ends a sequence of bounces on a moving side, which could otherwise be infinite. Once a
   !> collision dissipates less than the rounding error, the disk takes the normal velocity of the
   !> side.
   pure subroutine end_bouncing(v, before, normal_velocity, normal)

@@ -292,9 +292,9 @@ contains
   end function side_velocity
 
   !> Finds the first contact of a disk with any of the given obstacles, if it precedes the earliest
-  !> event found so far. Images of an obstacle shifted by at most one period are sufficient: a disk
-  !> that passes a periodic side is shifted back into the box, and its contacts are predicted anew.
-  !> An obstacle that encloses the disks has no images.
+  !> event found so far. Only images shifted by at most one period need to be tested. A disk that
+  !> passes a periodic side is shifted back into the box, and its contacts are predicted anew. An
+  !> obstacle that encloses the disks has no images.
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -320,7 +320,7 @@ contains
 
   !> Finds the contact of a disk with one image of an obstacle, if it precedes the earliest event
   !> found so far. Without gravity, a disk that has just left a convex obstacle cannot touch it
-  !> again before another collision; such a contact would be a rounding error and is not predicted.
+  !> again before another collision. Such a contact would be a rounding error and is not predicted.
   pure subroutine find_image_contact(box, disk, last, obstacle, shift, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk

@@ -64,10 +64,10 @@ contains
   end subroutine centre_range
 
   !> Time when a disk touches a wall, or its centre reaches a periodic or open side. A gap made
-  !> negative by rounding is set to zero, so that a disk moving outwards at a wall is reflected
+  !> negative by rounding is set to zero. A disk moving outwards at a wall is then reflected
   !> immediately and cannot leave the box. At a moving side, gaps below the rounding error are also
-  !> set to zero; otherwise a sequence of ever shorter bounces between disk and side would be
-  !> infinite.
+  !> set to zero. Otherwise the bounces between disk and side could become ever shorter, and their
+  !> sequence would be infinite.
   pure function side_time(box, disk, side) result(t)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -140,9 +140,9 @@ contains
   end subroutine next_side
 
   !> Moves a disk away from moving sides that it would touch before the time `now`. A new time
-  !> origin changes the position and velocity of a moving side by rounding errors. These can shift
-  !> the predicted contact of a disk close to the side to a time before `now`. The displacement of
-  !> the disk is of the order of these errors.
+  !> origin changes the position and velocity of a moving side by rounding errors. These errors can
+  !> shift the predicted contact of a disk close to the side to a time before `now`. The
+  !> displacement of the disk is of the order of these errors.
   pure subroutine separate_from_sides(box, disk, now)
     type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk

@@ -183,7 +183,7 @@ contains
   end function tangential_impulse
 
   !> Velocity after a collision with a wall at rest. The normal component points away from the wall
-  !> even if the disk was already moving away, so that a second collision due to rounding errors
+  !> even if the disk was already moving away. A second collision due to rounding errors therefore
   !> cannot push the disk through the wall.
   pure function wall_rebound(law, v, normal, elastic) result(after)
     type(wall_law_t), intent(in) :: law

@@ -39,7 +39,7 @@ module disks
 
   integer, parameter :: longest_name = 40            !! maximum length of the name of a species
 
-  !> A species, whose disks have the same contact law and, unless masses are read from a file, the
+  !> A species. Its disks have the same contact law and, unless masses are read from a file, the
   !> same mass.
   type :: species_t
     character(len=:), allocatable :: name
@@ -109,7 +109,8 @@ contains
     type(tag_t), intent(in) :: tag(:)
     logical, intent(in) :: chosen(:)
     integer(int32), allocatable, intent(out) :: index(:)
-    integer(int32), allocatable :: index_of(:)  ! index of each chosen disk, by id; 0 for all other disks
+    ! For each id, the index of the disk if it is chosen, otherwise 0.
+    integer(int32), allocatable :: index_of(:)
     integer(int32) :: i
 
     allocate (index_of(size(tag)), source=0_int32)

@@ -142,8 +142,8 @@ contains
       mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    ! The impulse is divided by the mass, because multiplying it by a stored reciprocal mass would
-    ! repeat the same rounding error in all collisions.
+    ! The impulse is divided by the mass. Multiplying it by a stored reciprocal mass would repeat
+    ! the same rounding error in all collisions.
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
@@ -353,7 +353,7 @@ contains
   end function are_in_contact
 
   !> Removes the approach velocity that rounding errors can leave after a collision of two disks.
-  !> The test uses the same expression as the prediction of contacts, so that the pair is not
+  !> The test uses the same expression as the prediction of contacts. The pair is therefore not
   !> predicted to collide again. No event is counted, and the clocks do not change.
   pure subroutine remove_residual_approach(sim, i, j)
     type(simulation_t), intent(inout) :: sim

@@ -301,8 +301,8 @@ contains
   !> Two-dimensional pressure P by the virial theorem, P A = K + W/(2t). Here K is the present
   !> kinetic energy, A the present accessible area, and t the time since the start of the run. W is
   !> the sum of impulse times distance over all disk-disk collisions in this time. Between walls, P
-  !> differs from the mean force per length of a wall, because walls act on the centres of disks at
-  !> the distance of one radius.
+  !> differs from the mean force per length of a wall, because the centre of a disk in contact with
+  !> a wall is at the distance of one radius.
   pure function pressure(sim, kinetic)
     type(simulation_t), intent(in) :: sim
     !> Kinetic energy relative to the velocity profile of a sheared box [energy].

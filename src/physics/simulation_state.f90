@@ -544,8 +544,9 @@ contains
   end subroutine register_contact
 
   !> Updates the sums of flux changes after a change of the velocity of disk i at the time t. The
-  !> time integral of a flux is the present flux times the present time, minus the sum over all its
-  !> changes, each multiplied by its time. This expression is exact at any time.
+  !> time integral of a flux is the present flux times the present time, minus the sum over all
+  !> changes of the flux, each multiplied by the time of the change. This expression is exact at any
+  !> time.
   pure subroutine record_velocity_change(self, i, before, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i

@@ -53,8 +53,8 @@ module tally
   type :: tally_t
     integer(int64) :: events = 0                   !! number of events
     integer(int64) :: collisions = 0               !! number of disk-disk collisions
-    !> Number of collisions of two disks that had both already collided at exactly the same time
-    !> (see `collapses`).
+    !> Number of collisions in which both disks had already collided earlier at exactly the same
+    !> time (see `collapses`).
     integer(int64) :: simultaneous = 0
     !> Numbers of collisions and of disks in the longest series with more collisions than
     !> `longest_finite` allows; 0 if there is none.

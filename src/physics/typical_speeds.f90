@@ -8,7 +8,8 @@ submodule(simulation_state) typical_speeds
   !> `rare` times a typical term of the lightest disks, whichever is smaller.
   real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
   !> Reduction of the units of the exact sums in driven simulations. The work of walls and kicks may
-  !> be far smaller than estimated from their parameters; the smaller units still resolve it.
+  !> be far smaller than estimated from their parameters. With the smaller units, such work is still
+  !> resolved.
   real(real64), parameter :: finer = 2.0_real64**(-30)
 
 contains
