@@ -257,7 +257,7 @@ contains
 
   !> Grows each disk into the gap between it and its neighbours, up to the relative size `cap`.
   !> Neighbours share the distance between their centres in proportion to their full radii, unless
-  !> one of them already exceeds its share.
+  !> one of the two already exceeds its share.
   subroutine grow(self, cap)
     class(growth_t), intent(inout) :: self
     real(real64), intent(in) :: cap                     !! maximum size, relative to the full size

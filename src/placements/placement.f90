@@ -114,8 +114,8 @@ contains
     text = ""
   end function shortfall
 
-  !> Factor by which disks are shrunk when positions from an initial-configuration file are tested:
-  !> the shrunk disks must not overlap.
+  !> Factor by which disks are shrunk when positions from an initial-configuration file are tested.
+  !> The shrunk disks must not overlap.
   pure function starting_scale(self) result(scale)
     class(placement_t), intent(in) :: self
     real(real64) :: scale

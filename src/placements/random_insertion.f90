@@ -112,8 +112,8 @@ contains
         voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last voxel fills the gap
         voxels%n = voxels%n - 1
       end if
-      ! Dividing the voxels pays off only after about twice as many failed attempts as there are
-      ! voxels, because the division of a voxel requires four searches.
+      ! Dividing the voxels pays off only when the number of failed attempts is about twice the
+      ! number of voxels, because the division of a voxel requires four searches.
       if (failures > 2*voxels%n) then
         call halve(voxels, packing, radius)
         call line%show_share("placing disks", real(placed, real64)/count)

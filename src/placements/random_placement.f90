@@ -72,7 +72,7 @@ contains
     call stream%seed(batch%seed, [int(batch%number), stream_number])
     call centre_range(batch%region, packing%box, batch%largest_radius, lower, upper)
     ! The number of disks that fit varies between attempts. A species of few disks is tried more
-    ! often, because the relative variation is larger.
+    ! often, because its number of fitting disks varies more, relative to the mean.
     do trial = 1, merge(1, max(1, many_trials/count), minval(batch%radius) < maxval(batch%radius))
       call packing%open_species(batch%number, batch%largest_radius, count, lower, upper)
       call insert_at_random(packing, batch%number, batch%first, batch%radius, stream, line, placed)
