@@ -177,7 +177,7 @@ contains
   end subroutine watch_pistons
 
   !> Rectangle that contains the centres of all disks in a cell. At a side of the box, the rectangle
-  !> extends to the outermost position of that side; towards a piston it is unbounded.
+  !> extends to the outermost position of that side. Towards a piston it is unbounded.
   pure subroutine rectangle(self, cell, n, low, high)
     class(cell_faces_t), intent(in) :: self
     integer(int32), intent(in) :: cell(2)          !! column and row in the grid of the whole box
@@ -282,8 +282,8 @@ contains
   end subroutine next_straight
 
   !> Time at which a disk on a straight path reaches the line ahead along one axis. If the line is a
-  !> side, the time is bit-identical to that of `side_time`, because the result must not depend on
-  !> the procedure that predicts a collision.
+  !> side, the time is bit-identical to the result of `side_time`, because the result must not
+  !> depend on the procedure that predicts a collision.
   pure function line_time(line, disk, axis) result(t)
     type(line_t), intent(in) :: line
     type(disk_t), intent(in) :: disk
@@ -403,7 +403,7 @@ contains
   end subroutine next_moving
 
   !> Time at which a disk on a parabolic path reaches a face or side. The equation of motion has an
-  !> earlier root, at which the disk entered the cell; this root is excluded.
+  !> earlier root, the time at which the disk entered the cell. This root is excluded.
   pure function falling_time(line, axis, box, disk, now) result(t)
     type(line_t), intent(in) :: line
     integer(int32), intent(in) :: axis

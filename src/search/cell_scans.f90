@@ -1,5 +1,5 @@
-!> Contacts that the simple search of 3 x 3 cells does not find: with disks in linked lists of
-!> crowded cells or across a periodic side, with obstacles, and with big disks.
+!> Contacts that the simple search of 3 x 3 cells does not find: contacts with disks in linked lists
+!> of crowded cells, with disks across a periodic side, with obstacles, and with big disks.
 module cell_scans
   use kinds, only: int32, int64, real64
   use box_geometry, only: find_image_contact, stays_clear
@@ -218,8 +218,8 @@ contains
     end do
   end subroutine scan_rim
 
-  !> Adds disks in linked lists to the candidates found by `gather`, for the crowded cells among the
-  !> cell of a disk and its eight neighbours.
+  !> Adds disks in linked lists to the candidates found by `gather`. Linked lists exist in the
+  !> crowded cells among the cell of a disk and its eight neighbours.
   subroutine add_chains_around(cells, sim, known, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
@@ -277,7 +277,7 @@ contains
     end do
   contains
 
-    !> Last of the adjacent rows or columns in the same image as a given one.
+    !> The last of the adjacent rows or columns that are in the same image as a given row or column.
     pure function last_alike(image, first) result(last)
       integer(int32), intent(in) :: image(-1:1), first
       integer(int32) :: last
@@ -321,7 +321,7 @@ contains
   end subroutine scan_around_seam
 
   !> Version of `scan_around_seam` for sheared boxes, whose images above and below move along x. In
-  !> these images six columns are searched instead of three, so that no contact is missed before the
+  !> these images six columns are searched instead of three. No contact is then missed before the
   !> images have moved by the width of a column.
   subroutine scan_around_moving_seam(cells, layout, sim, images, known, near)
     type(cell_contents_t), intent(in) :: cells

@@ -147,7 +147,7 @@ contains
   end subroutine count_collision
 
   !> Decides whether the collisions of disks i and j and of the disks around them are a collapse. If
-  !> the number of collisions is finite, the disks are not examined again until they have collided
+  !> the number of collisions is finite, the disks are examined again only after they have collided
   !> as often as predicted. If rounding errors determine the gaps, the number of collisions until
   !> the next examination doubles each time.
   subroutine judge(sim, i, j, t, is_resolved)
@@ -266,8 +266,8 @@ contains
       contact%sliding = contact%normal(2)*dv(1) - contact%normal(1)*dv(2)
       associate (p => sim%disk(member(a)), q => sim%disk(member(b)))
         contact%slip = -contact%sliding - p%radius*sim%spin(member(a)) - q%radius*sim%spin(member(b))
-        ! A row of disks may move as a whole or fall; rounding errors of this common motion must not
-        ! end its collapse.
+        ! A row of disks may move as a whole or fall. Rounding errors of this common motion must not
+        ! end the collapse of the row.
         noise = spacing(maxval(abs([p%v, q%v]))) + magnitude(dv)/distance*spacing(maxval(abs([p%x, q%x])))
         if (abs(contact%sliding) <= resolved*noise) contact%sliding = 0
       end associate

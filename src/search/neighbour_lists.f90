@@ -12,9 +12,9 @@
 !> marked as incomplete. Until the disk receives a new list, its predictions search the 3 x 3 cells
 !> around it.
 !>
-!> If the radii differ so much that 3 x 3 cells contain very many disks, the disks with small
-!> neighbourhoods are also sorted into a second grid of narrow cells, according to the centres of
-!> their neighbourhoods. A new list of such a disk then requires only a search of 3 x 3 narrow
+!> If the radii differ very much, 3 x 3 cells contain very many disks. The disks with small
+!> neighbourhoods are then also sorted into a second grid of narrow cells, according to the centres
+!> of their neighbourhoods. A new list of such a disk then requires only a search of 3 x 3 narrow
 !> cells, and of 3 x 3 wide cells for the few disks with large neighbourhoods.
 module neighbour_lists
   use, intrinsic :: iso_fortran_env, only: real32

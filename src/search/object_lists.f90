@@ -1,8 +1,8 @@
 !> Obstacles and big disks that reach into each cell. Big disks are a few disks much larger than all
 !> others.
 !>
-!> The width of the cells is chosen for the small disks. A big disk is listed in each cell in which
-!> a small disk could touch it while the big disk stays within a margin around its reference
+!> The width of the cells is chosen for the small disks. A cell lists each big disk that a small
+!> disk in the cell could touch, as long as the big disk stays within a margin around its reference
 !> position. A prediction for a big disk tests the small disks in the cells along its rim. The cost
 !> of every prediction therefore depends only on the sizes of nearby disks.
 module object_lists

@@ -1,6 +1,6 @@
 !> Lists of obstacles for all cells of the box: the list of a cell contains the obstacles that a
 !> disk centred in the cell may overlap. The cost of testing a point for overlaps then does not
-!> depend on the number of obstacles, while the cost of making the lists is proportional to it.
+!> depend on the number of obstacles. The cost of making the lists is proportional to this number.
 module obstacle_cells
   use box_geometry, only: box_t
   use grid, only: cell_lists_t, grid_t, split_block

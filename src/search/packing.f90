@@ -1,6 +1,6 @@
 !> A packing: a set of disks at fixed positions. The module tests whether another disk fits between
 !> them, and finds the first disk touched by a moving disk. Each species has its own grid of cells,
-!> adapted to its radii; the cost of a search then does not depend on the radii of other species.
+!> adapted to its radii. The cost of a search then does not depend on the radii of other species.
 module packing
   use grid, only: grid_t
   use images, only: images_t
