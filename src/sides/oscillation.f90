@@ -156,8 +156,8 @@ contains
   end function velocity
 
   !> Time until the side touches a disk. A disk that stays within the range of the oscillation for a
-  !> whole period is touched, unless it is slow and at the very end of this range. After each period
-  !> without contact, the search therefore skips an increasing number of periods.
+  !> whole period is touched by the side, unless it is slow and at the very end of this range. After
+  !> each period without contact, the search therefore skips an increasing number of periods.
   pure function contact_time(self, tau, gap, v, g, state) result(s)
     class(oscillation_t), intent(in) :: self
     real(real64), intent(in) :: tau, gap, v, g       !! see `side_motion`
