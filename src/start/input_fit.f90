@@ -31,7 +31,7 @@ module input_fit
   !> Packing fraction of the triangular lattice.
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)
   !> Ratio of the smallest to the largest radius above which the densest packing of unequal disks is
-  !> no denser than that of equal disks (Blind, 1969, see `densest_packing`).
+  !> no denser than the densest packing of equal disks (Blind, 1969, see `densest_packing`).
   real(real64), parameter :: nearly_equal = 0.743_real64
 
   !> Total area and range of radii of the disks of a species.
@@ -213,9 +213,9 @@ contains
   !> rectangular box, walled or periodic, because copies of the box fill the plane at the same
   !> packing fraction. For nearly equal radii it is the packing fraction of the triangular lattice
   !> (Blind, Journal für die reine und angewandte Mathematik 236, 145, 1969). For other radii,
-  !> consider a disk of the largest radius and two of the smallest that touch each other. The bound
-  !> is the packing fraction in the triangle of their centres (Florian, Rendiconti del Circolo
-  !> Matematico di Palermo 9, 300, 1960). Both results are reviewed by Fernique (2021,
+  !> consider a disk of the largest radius and two disks of the smallest radius that all touch each
+  !> other. The bound is the packing fraction in the triangle of their centres (Florian, Rendiconti
+  !> del Circolo Matematico di Palermo 9, 300, 1960). Both results are reviewed by Fernique (2021,
   !> arXiv:2107.14079).
   pure function densest_packing(ratio) result(most)
     real(real64), intent(in) :: ratio                         !! smallest radius divided by the largest
@@ -279,10 +279,10 @@ contains
     end do
   end subroutine check_strokes
 
-  !> Determines whether the disks of a species rotate, and reads the number and radii of the disks
-  !> from an initial-configuration file unless the input contains both. If the input contains both,
-  !> an unreadable file is reported only when the disks are placed. A resumed run places no disks
-  !> and does not need the file.
+  !> Determines whether the disks of a species rotate. Reads the number and radii of the disks from
+  !> an initial-configuration file, unless the input contains both. If the input contains both, an
+  !> unreadable file is reported only when the disks are placed. A resumed run places no disks and
+  !> does not need the file.
   subroutine read_missing_values(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
     integer, intent(in) :: k                                  !! index of the species

@@ -74,9 +74,9 @@ contains
   end subroutine draw_initial_velocities
 
   !> Draws the velocities of one species. If the total momentum must vanish, velocities of equal
-  !> speed are drawn as opposite pairs; if the number of disks is odd, three of them point in
-  !> directions 120 degrees apart. These velocities add up to zero although all disks have the same
-  !> speed. For 'uniform' and 'maxwell', `remove_drift` sets the total momentum to zero.
+  !> speed are drawn as opposite pairs. If the number of disks is odd, three of the velocities point
+  !> in directions 120 degrees apart. These velocities add up to zero although all disks have the
+  !> same speed. For 'uniform' and 'maxwell', `remove_drift` sets the total momentum to zero.
   subroutine draw_velocities(self, species, balanced, disk)
     class(drawing_t), intent(inout) :: self
     type(species_settings_t), intent(in) :: species
