@@ -6,7 +6,8 @@
 # prints "h5fc" and exits with status 1.
 set -u
 mapfile -t candidates < <(type -ap h5fc)
-# The h5fc of the system is not tested, because the test would double the time that make needs before it compiles.
+# The h5fc of the system is not tested. The test would double the time that passes before make
+# starts to compile.
 case ${candidates[0]:-} in /usr/bin/h5fc | /bin/h5fc) echo h5fc && exit ;; esac
 folder=$(mktemp -d) || exit
 trap 'rm -rf -- "$folder"' EXIT

@@ -15,7 +15,7 @@ module library_events
   implicit none
   private
 
-  !> Number of events and kicks after which `next_events` gives up; increased by 100 for each
+  !> Number of events and kicks after which `next_events` ends its search; increased by 100 for each
   !> requested event.
   integer(int64), parameter :: longest_look = 2000000
 

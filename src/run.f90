@@ -247,8 +247,8 @@ contains
       if (allocated(error)) exit
       now = seconds()
       stopping = stop_requested()
-      ! Each part of a run advances the simulation at least once, however short the wall-clock
-      ! limit.
+      ! Each part of a run advances the simulation at least once, even if the wall-clock limit is
+      ! very short.
       if (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock) stopping = .true.
       requests = checkpoint_requests()
       if (stopping .or. requests > requests_served .or. now > next_checkpoint) then
