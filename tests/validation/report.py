@@ -261,7 +261,7 @@ def outcome(cases: list[dict], seconds: float) -> str:
 ROUNDING = """
 ## Cases that agree to rounding
 
-The columns are those of the first table, with the number of compared *values*.
+The table has the columns of the first table, and a column with the number of compared *values*.
 
 | case | quantity | values | source | tolerance | verdict |
 |---|---|---|---|---|---|
@@ -290,14 +290,15 @@ are:
   are allowed. For n bars the percentage has a standard deviation of 47 / √n by chance.
 - *error / scatter*: mean error divided by the standard deviation of the measured values. Errors
   with Student's t make this ratio larger than 1.
-- *three*: coverage of means over three bars, whose errors follow from their scatter.
+- *three*: coverage of means over three values, with errors calculated from the scatter of
+  these values.
 
 Four rows of the craters are outside the limits. A projectile as light as a disk hits or displaces
 few disks in most beds and many in some: the distribution of these numbers is skewed (skewness 2.2).
 Four values of such a distribution often include no large value; then both their mean and their
 error are too small. For means over more values, drawn at random from 240 craters, the coverage is
-better: 64 % for 16 values, and 67 % for 64 values. The exponents follow from these numbers, and
-their errors are too small for the same reason.
+better: 64 % for 16 values, and 67 % for 64 values. The exponents are calculated from these
+numbers, and the errors of the exponents are too small for the same reason.
 
 | system | quantity | bars | coverage | error / scatter | three |
 |---|---|---|---|---|---|
