@@ -80,10 +80,10 @@ module variable_rows
 
   ! The status of a variable determines its line in the reference file and the meaning of `value`:
   ! - "default": the line contains the default value.
-  ! - "fallback": the line is a comment with the value that is the default where the variable
-  !   applies.
+  ! - "fallback": the line is a comment. It contains the default that the variable has with the
+  !   choice to which it belongs.
   ! - "example": the line contains an example, because every input must set the variable.
-  ! - "required": the line is a comment with an example; the choice to which the variable belongs
+  ! - "required": the line is a comment with an example. The choice to which the variable belongs
   !   requires a value.
   ! - "optional": the line is a comment with an example; there is no default, and no value is
   !   required.
