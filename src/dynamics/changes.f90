@@ -50,9 +50,10 @@ contains
     end do
   end function text_of_change
 
-  !> At the present time, replaces the box, the contact law and the driving of a simulation by those
-  !> of another input, which describes the same disks. Sides start new motions from their present
-  !> positions: at the present time, the old and the new law of motion must give the same position.
+  !> At the present time, replaces the box, the contact law and the driving of a simulation by the
+  !> box, contact law and driving of another input. The other input describes the same disks. Sides
+  !> start new motions from their present positions: at the present time, the old and the new law of
+  !> motion must give the same position.
   subroutine change_system(sim, system, problem)
     type(simulation_t), intent(inout) :: sim
     type(system_t), intent(in) :: system

@@ -51,8 +51,9 @@ module evolution
   end type evolution_t
 
   abstract interface
-    !> Prepares the dynamics for continuing from the state `sim`, the initial state or that of a
-    !> checkpoint. All data of the dynamics that are not part of the state are derived from it.
+    !> Prepares the dynamics for continuing from the state `sim`, which is the initial state or the
+    !> state of a checkpoint. All data of the dynamics that are not part of the state are derived
+    !> from it.
     subroutine start_evolution(self, sim)
       import :: evolution_t, simulation_t
       class(evolution_t), intent(inout) :: self

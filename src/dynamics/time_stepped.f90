@@ -1,7 +1,7 @@
-!> Time-stepped dynamics. In each step of fixed length, all disks first move in exact free flight;
-!> then each disk beyond a wall is reflected, and each overlapping, approaching pair collides once.
-!> A contact is detected up to one step late, and missed if it begins and ends within a step. The
-!> method exists for comparison with event-driven dynamics.
+!> Time-stepped dynamics. In each step of fixed length, all disks first move in exact free flight.
+!> Then each disk beyond a wall is reflected, and each pair of overlapping, approaching disks
+!> collides once. A contact is detected up to one step late, and missed if it begins and ends within
+!> a step. The method exists for comparison with event-driven dynamics.
 !>
 !> As in event-driven dynamics, the stored state of a disk changes only in its collisions, so that
 !> rounding errors do not accumulate from step to step.
@@ -139,9 +139,10 @@ contains
   end function at_rest
 
   !> Advances all disks to the time t and executes all collisions that are due: first with sides,
-  !> then with obstacles, then between disks. Within each group the order is that of the disk
-  !> indices, so the result does not depend on how pairs are searched for. If a stop is requested
-  !> during a long search, the procedure returns early and leaves the state unchanged.
+  !> then with obstacles, then between disks. Within each group, collisions are executed in the
+  !> order of the disk indices, so the result does not depend on how pairs are searched for. If a
+  !> stop is requested during a long search, the procedure returns early and leaves the state
+  !> unchanged.
   subroutine take_step(self, sim, t, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
