@@ -1,6 +1,6 @@
 !> Layout of the output file, which follows H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html): names
-!> of groups and fixed paths of datasets. The module `observables` defines the names of observables,
-!> and `samples` those of the event log.
+!> of groups and fixed paths of datasets. The module `observables` defines the names of observables;
+!> the module `samples` defines the names in the event log.
 module h5md_layout
   implicit none
   private

@@ -133,7 +133,7 @@ contains
 
   !> Initialises the HDF5 library, once per process because each initialisation leaks memory. HDF5
   !> must not print errors. HDF5 needs no exit handler, because the program closes all files before
-  !> it exits; on a full disk, where a file cannot be closed, the exit handler would crash. External
+  !> it exits. On a full disk a file cannot be closed, and the exit handler would crash. External
   !> links are disabled, because they could refer to devices or to files of other users.
   subroutine start_library(status)
     integer, intent(out) :: status

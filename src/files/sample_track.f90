@@ -139,8 +139,8 @@ contains
     call self%put_counter(file)
   end subroutine make
 
-  !> Links the step and the time of all H5MD elements to those of the first element, as H5MD
-  !> prescribes for elements that are sampled together.
+  !> Links the step and the time of all H5MD elements to the step and the time of the first element.
+  !> H5MD prescribes these links for elements that are sampled together.
   subroutine link_step_and_time(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
