@@ -1,10 +1,10 @@
 !> Arcs of circles, impenetrable from both sides. Disks also collide with the ends of an arc.
 !>
 !> When a disk touches an arc, the centre of the disk lies on a circle about the centre of the arc.
-!> The radius of this circle is the sum of both radii for a disk outside the arc, and their
-!> difference for a disk inside. In both cases the centre of the disk must lie between the first and
-!> the last angle of the arc. From inside, a disk larger than the arc can touch only the ends. The
-!> centre of a disk that touches an end lies on a circle about this end. This circle meets the
+!> The radius of this circle is the sum of both radii for a disk outside the arc, and the difference
+!> of both radii for a disk inside. In both cases the centre of the disk must lie between the first
+!> and the last angle of the arc. From inside, a disk larger than the arc can touch only the ends.
+!> The centre of a disk that touches an end lies on a circle about this end. This circle meets the
 !> circles of both faces (the outer and the inner side of the arc) with common tangents. If rounding
 !> errors hide a contact with a face near an end, the contact is therefore found as a contact with
 !> the end.
@@ -203,7 +203,7 @@ contains
 
     !> True if a disk on a straight path moves away from a point. Within rounding errors, the path
     !> may also be at a right angle to the direction of the point. A disk moving away from the
-    !> centre of a circle cannot collide with the circle from outside; without this test, rounding
+    !> centre of a circle cannot collide with the circle from outside. Without this test, rounding
     !> errors could cause a second collision with the same face or end of the arc.
     pure function grazes(from) result(yes)
       real(real64), intent(in) :: from(2)       !! vector from the point to the centre of the disk [length]

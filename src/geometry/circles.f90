@@ -41,9 +41,9 @@ contains
   end function new_circle
 
   !> Vector to the point x from the middle of the nearest periodic image of the circle. Circles that
-  !> enclose disks have no images. If two images are equally close, a disk at x may touch both. The
-  !> chosen image is then the one for which the result has the same sign along the periodic axis as
-  !> the vector `heading`.
+  !> enclose disks have no images. If two images are equally close, a disk at x may touch both. Of
+  !> the two images, the image is then chosen for which the result has the same sign along the
+  !> periodic axis as the vector `heading`.
   pure function from_nearest(self, x, images, heading) result(d)
     class(circle_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
