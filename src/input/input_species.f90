@@ -172,8 +172,8 @@ contains
     end associate
   end subroutine take_velocities
 
-  !> Sets the variable that must be equal for all species of a placement that moves all disks:
-  !> species in which it is not given receive the value of another species.
+  !> Sets a variable that must be equal for all species. Species without a given value receive the
+  !> value of another species.
   subroutine share_variable(groups, species, problems)
     type(group_t), intent(inout) :: groups(:)
     type(species_settings_t), intent(inout) :: species(:)
