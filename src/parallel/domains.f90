@@ -45,8 +45,8 @@ module domains
     !> Indices of the domains that own disks in this extended domain.
     integer(int32), allocatable :: neighbour(:)
     type(cell_layout_t) :: layout
-    !> Owned disks and ghosts, with some vacant array elements (slots). The time origin is that of
-    !> the whole simulation.
+    !> Owned disks and ghosts, with some vacant array elements (slots). The time origin is the same
+    !> as in the whole simulation.
     type(simulation_t) :: sim
     type(domain_engine_t) :: engine
     !> Index of each disk in the whole simulation. The elements of vacant slots form a linked list.

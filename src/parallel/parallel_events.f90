@@ -1,5 +1,5 @@
 !> Parallel event-driven dynamics, on several cores, or on one core with domains that fit into its
-!> cache. The results are bit-identical to those of the serial engine. The box is divided into
+!> cache. The results are bit-identical to the results of the serial engine. The box is divided into
 !> domains, each with its own engine. The domains advance independently through one time window and
 !> are then compared (see `partition` and `domains`). If a window is invalid, the simulation returns
 !> to its state before the present series of windows. The serial engine takes over for small or

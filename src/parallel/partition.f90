@@ -257,7 +257,7 @@ contains
   end subroutine choose_target
 
   !> Determines, after the comparison of the domains, whether the window is valid and whether
-  !> another one is started.
+  !> another window is started.
   subroutine end_window(self, sim, limits, most, plan)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
