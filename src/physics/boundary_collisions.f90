@@ -45,8 +45,8 @@ contains
     else
       sim%disk(i)%v = wall_rebound(law, v - normal_velocity, normal, elastic)
       if (any(abs(normal_velocity) > 0)) then
-        ! The rounded velocity of the disk is not below that of the side, because rounding is
-        ! monotonic.
+        ! The rounded velocity of the disk is not below the velocity of the side, because rounding
+        ! is monotonic.
         sim%disk(i)%v = sim%disk(i)%v + normal_velocity
         if (law%restitution < 1 .and. .not. elastic) call end_bouncing(sim%disk(i)%v, v, normal_velocity, normal)
       end if

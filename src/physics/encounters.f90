@@ -34,7 +34,7 @@ contains
   end function need_general
 
   !> Executes the collision of disk i at the time t with the partner `code`, by the general
-  !> procedure or by the fast ones for pairs and walls.
+  !> procedure or by the fast procedures for pairs and walls.
   subroutine execute_collision(sim, i, code, t, counts, general, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
