@@ -1,8 +1,8 @@
 !> Equilibration of a dense packing by event-chain Monte Carlo (Bernard, Krauth and Wilson, 2009,
 !> doi:10.1103/PhysRevE.80.056704). In an event chain, a disk moves along an axis until it touches a
-!> second disk, which then moves in the same direction until it touches a third, and so on, until
-!> the sum of all displacements equals the length of the chain. Chains along x and along y
-!> alternate.
+!> second disk. The second disk then moves in the same direction until it touches a third disk, and
+!> so on. The chain ends when the sum of all displacements equals its length. Chains along x and
+!> along y alternate.
 !>
 !> Along a periodic axis, all chains move to the right or upwards. The state of a chain consists of
 !> the positions of all disks and the index of the moving disk. Each state has exactly one
@@ -130,9 +130,9 @@ contains
   end subroutine fill
 
   !> Estimates the mean displacement of a disk in a chain. In equilibrium, this displacement is pi/4
-  !> diameters divided by Z - 1, where pi/4 diameters is the mean distance between successive disks
-  !> of a chain along its direction, and Z is the compressibility factor (Michel, Kapfer and Krauth,
-  !> 2014, doi:10.1063/1.4863991). For Z - 1 the larger of two estimates is used, from scaled
+  !> diameters divided by Z - 1 (Michel, Kapfer and Krauth, 2014, doi:10.1063/1.4863991). Here pi/4
+  !> diameters is the mean distance between successive disks of a chain along its direction, and Z
+  !> is the compressibility factor. For Z - 1 the larger of two estimates is used, from scaled
   !> particle theory and from the free volume of a crystal.
   pure function mean_step(box, radius) result(step)
     type(box_t), intent(in) :: box

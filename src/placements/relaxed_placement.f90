@@ -97,8 +97,9 @@ contains
     call relax(box, batch%radius, batch%seed, self%sweeps, line, batch%x)
   end subroutine place
 
-  !> Places the disks on a lattice in random order, if they have equal radii, a packing fraction
-  !> above freezing, and a box into which the lattice fits. Otherwise no positions are returned.
+  !> Places the disks on a lattice in random order. The disks must have equal radii and a packing
+  !> fraction above freezing, and the lattice must fit into the box. Otherwise no positions are
+  !> returned.
   subroutine place_on_lattice(batch, packing)
     type(batch_t), intent(inout) :: batch
     type(packing_t), intent(in) :: packing
