@@ -1,5 +1,5 @@
-!> Columns and rows of the cells in which disks are searched: those of the whole box, whose width is
-!> chosen here, or those of a domain of a parallel run.
+!> Columns and rows of the cells in which disks are searched. They are the cells of the whole box,
+!> whose width is chosen here, or the cells of a domain of a parallel run.
 module cell_layout
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t
@@ -30,7 +30,8 @@ module cell_layout
     real(real64) :: lower(2) = 0.0_real64          !! lower left corner of the box [length]
     real(real64) :: width(2) = 0.0_real64          !! distance between adjacent cells [length]
     ! Along an axis with a periodic side inside the block, `last` is the column or row just before
-    ! this side and `next` the one just behind it. Along an axis without such a side, both are 0.
+    ! this side, and `next` is the column or row just behind it. Along an axis without such a side,
+    ! both are 0.
     integer(int32) :: last(2) = 0
     integer(int32) :: next(2) = 0
   contains

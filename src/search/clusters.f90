@@ -51,7 +51,8 @@ module clusters
   !> Velocity changes at each contact (first index) per unit impulse at another contact (second
   !> index) [1/mass].
   type :: couplings_t
-    !> Normal (tangential) velocity change by a normal (tangential) impulse.
+    !> Normal velocity change by a normal impulse; equal to the tangential velocity change by a
+    !> tangential impulse.
     real(real64), allocatable :: along(:, :)
     real(real64), allocatable :: across(:, :)        !! tangential velocity change by a normal impulse
     !> Tangential velocity change of rotating surfaces by a tangential impulse.

@@ -1,5 +1,5 @@
-!> Detects inelastic collapses, in which an unbounded number of collisions occurs in a finite time,
-!> and counts simultaneous collisions, which occur at exactly the same time.
+!> Detects inelastic collapses, in which an unbounded number of collisions occurs in a finite time.
+!> Counts simultaneous collisions, which occur at exactly the same time.
 !>
 !> A collision may be part of a collapse if the gap between the two disks was negligible even before
 !> they approached each other. The simulation alone cannot decide this: near a limit of collapse,
@@ -22,8 +22,8 @@ module collapses
   public :: still, watch
 
   !> A collision is examined if the two disks have hardly moved relative to each other since the
-  !> later of their previous events. The first number is the maximum relative displacement, the
-  !> second the maximum decrease of the gap, both in units of the sum of the radii.
+  !> later of their previous events. The first number is the maximum relative displacement, and the
+  !> second number is the maximum decrease of the gap. Both are in units of the sum of the radii.
   real(real64), parameter :: still = 2.0_real64**(-14), negligible = 2.0_real64**(-33)
   !> A decrease of a gap, or a sliding velocity, is larger than the rounding errors if it exceeds
   !> this number of spacings of the floating-point coordinates or velocities.

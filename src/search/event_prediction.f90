@@ -47,11 +47,11 @@ contains
   !> contact time is therefore bit-identical for both disks, whenever it is predicted. Simultaneous
   !> contacts are ordered by `wins`.
   !>
-  !> Contact times before `now` result from rounding errors. For example, after a perfectly
-  !> inelastic collision the distance of two disks equals the sum of their radii only within
-  !> rounding errors, which change when one disk is shifted by a period. Such a contact occurs
-  !> either at `now` or not at all. Later predictions lead to the same decision: the shift of a disk
-  !> is itself an event, after which its contacts are predicted anew.
+  !> Contact times before `now` result from rounding errors. For example, the distance of two disks
+  !> after a perfectly inelastic collision equals the sum of their radii only within rounding
+  !> errors. These errors change when one disk is shifted by a period. Such a contact occurs either
+  !> at `now` or not at all. Later predictions lead to the same decision: the shift of a disk is
+  !> itself an event, after which its contacts are predicted anew.
   !>
   !> The contact time s is the first root of |dx + dv s| = sigma. The root is calculated as s =
   !> c/(sqrt(disc) - b), with b = dx . dv and c = dx**2 - sigma**2, which avoids cancellation for

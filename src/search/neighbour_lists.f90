@@ -43,8 +43,8 @@ module neighbour_lists
 
   !> Minimum width of the cells in the second, narrow grid, in units of the radius plus margin of a
   !> disk of mean radius. A disk fits into a narrow cell if its radius plus margin is at most half
-  !> the width of the cell. Since the value is above 2, all disks up to the mean radius and some
-  !> larger ones fit.
+  !> the width of the cell. Since the value is above 2, the narrow cells are wide enough for all
+  !> disks up to the mean radius and for some larger disks.
   real(real64), parameter :: narrow_width = 2.2_real64
 
   !> The region around a disk in which its list is valid. When the centre of the disk leaves it, the

@@ -61,7 +61,7 @@ contains
   end function near_piston
 
   !> Finds the new strip of a piston that is leaving its present one, and lists the disks in both
-  !> strips, whose events must be predicted anew.
+  !> strips. The events of these disks must be predicted anew.
   subroutine change_strips(self, sim, disks)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
