@@ -406,7 +406,8 @@ contains
       call group%complain(variable, what//", along "//merge("x", "y", axis == 1), problems)
     end subroutine complain
 
-    !> Checks that the packing fraction does not exceed that of the densest possible packing.
+    !> Checks that the packing fraction does not exceed the packing fraction of the densest possible
+    !> packing.
     subroutine check_fraction()
       real(real64) :: packing
       character(len=:), allocatable :: variable, filled, shortfall

@@ -38,7 +38,7 @@ module starting_disks
 
 contains
 
-  !> True if the path is that of a finished or unfinished output of a run.
+  !> True if the path belongs to a finished or unfinished output of a run.
   pure function is_run(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
