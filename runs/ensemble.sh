@@ -45,8 +45,8 @@ checkpoint.  Copies of the command on one folder share the work.  The program is
 that of RICOCHET, or ricochet in the folder of this command (in a clone build/ricochet).  All
 machines need the same folders.
 
-exit:   0 all members finished; 1 some members failed; 2 wrong usage; 3 the folder cannot be used;
-        75 stopped, the same command continues
+exit:   0 all members finished; 1 some members failed; 2 wrong usage or input; 3 the folder
+        cannot be used; 75 stopped, the same command continues
 TEXT
 }
 
@@ -556,14 +556,11 @@ program=${RICOCHET:-$program}
 [[ -f $program && -x $program ]] || die "there is no program $program: run make, or set RICOCHET"
 if [[ -n $dry ]]; then
   for k in "${!names[@]}"; do printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"; done
-  arguments=("$input" --check --quiet) status=0
-  add_overrides "${overrides[0]}"
-  reason=$("$program" "${arguments[@]}" 2>&1 </dev/null) || status=$?
-  ((status != 2)) || die "member ${names[0]} cannot run: ${reason##*$'\n'}"
-  ((status == 0)) || printf '%s: note: member %s cannot run yet: %s\n' "$me" "${names[0]}" "${reason##*$'\n'}" >&2
+  check_member 0
   exit 0 # an initial-configuration file may be produced by another sweep, and not exist yet
 fi
 command -v flock >/dev/null || die "the program flock is missing (package util-linux)"
+[[ -n $share || $engine == slurm ]] || check_settings # Slurm: see check_inputs
 reason=$(mkdir -p -- "$folder" 2>&1) || fail 3 "cannot make $folder: ${reason##*: }"
 [[ -n $share ]] || remember
 

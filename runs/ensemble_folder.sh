@@ -2,8 +2,8 @@
 # shellcheck disable=SC2154,SC2034 # ensemble.sh assigns `folder` and other variables, and reads variables that this file assigns
 
 # Functions with which ensemble.sh reads and writes the files of a sweep. They determine from the files in `folder` which member
-# runs are finished, have failed or can continue, and store the settings of the member runs. They never write through links, into
-# FIFOs, or into files that ensemble.sh did not create. Errors are reported by `fail` and `die` of ensemble.sh.
+# runs are finished, have failed or can continue, and they check and store the settings of the member runs. They never write through
+# links, into FIFOs, or into files that ensemble.sh did not create. Errors are reported by `fail` and `die` of ensemble.sh.
 
 # may_be_ours FILE: succeeds if FILE does not exist or is an ordinary file.
 may_be_ours() { [[ ! -L $1 && (! -e $1 || -f $1) ]]; }
@@ -56,6 +56,33 @@ may_continue() {
   local arguments=("$input" -o "$folder/$1.h5" --resume --check --quiet) said
   add_overrides "$2"
   said=$("$program" "${arguments[@]}" 2>&1 </dev/null) || [[ $said == *"$is_finished"* ]]
+}
+
+# check_member K: reports if the program refuses the settings of member run K. Other problems are only noted by --dry-run.
+check_member() {
+  local arguments=("$input" --check --quiet) status=0 reason
+  add_overrides "${overrides[$1]}"
+  reason=$("$program" "${arguments[@]}" 2>&1 </dev/null) || status=$?
+  ((status != 2)) || die "member ${names[$1]} cannot run: ${reason##*$'\n'}"
+  [[ -z $dry ]] || ((status == 0)) || printf '%s: note: member %s cannot run yet: %s\n' "$me" "${names[$1]}" "${reason##*$'\n'}" >&2
+}
+
+# Checks each value of a variable, except seeds, in the first member run that uses it, before anything is written.
+check_settings() {
+  local k kind pair fresh arguments
+  local -A seen=()
+  for k in "${!names[@]}"; do
+    kind="kind ${overrides[k]}"
+    [[ ! $kind =~ ^(.*)'--set run.seed='[0-9]*$ ]] || kind=${BASH_REMATCH[1]}
+    if [[ -n ${seen[$kind]:-} ]] || is_done "${names[k]}"; then continue; fi
+    fresh=$((${#seen[@]} == 0)) arguments=() seen[$kind]=1
+    add_overrides "${overrides[k]}"
+    for pair in "${arguments[@]}"; do
+      [[ $pair == run.seed=* || -n ${seen[$pair]:-} ]] || fresh=1
+      seen[$pair]=1
+    done
+    ((fresh == 0)) || check_member "$k"
+  done
 }
 
 has_failed() {

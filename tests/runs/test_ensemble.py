@@ -370,12 +370,12 @@ def test_results_of_other_settings_are_not_mixed(lab):
 
 def test_settings_of_a_failed_member_may_be_mended(lab):
     manifest = lab / "members.txt"
-    manifest.write_text("a\t--set outcome.exit=2 \n")
+    manifest.write_text("a\t--set outcome.exit=3 \n")
     assert ensemble(lab, "--manifest", str(manifest)).returncode == 1
     (lab / "gas.nml").write_text("&run\n  title = 'mended'\n/\n")
     manifest.write_text("a\t--set run.seed=1 \n")
     assert ensemble(lab, "--manifest", str(manifest)).returncode == 0
-    assert starts(lab)["a"] == ["anew outcome.exit=2|", "anew run.seed=1|"]
+    assert starts(lab)["a"] == ["anew outcome.exit=3|", "anew run.seed=1|"]
 
 
 @pytest.mark.parametrize(

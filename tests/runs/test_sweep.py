@@ -157,6 +157,29 @@ def test_what_a_member_would_refuse_is_refused_before_any_runs(tmp_path):
 
 
 @pytest.mark.usefixtures("_tools")
+@pytest.mark.parametrize("engine", ["pool", "parallel"])
+@pytest.mark.parametrize(
+    ("scans", "refused"),
+    [
+        (["contact.restituton=0.9,0.8"], "restituton_0.9_seed_1"),
+        (["contact.restitution=0.9,2"], "restitution_2_seed_1"),
+        (["contact.restitution=0.9", "run.threads=1,x"], "restitution_0.9_threads_x_seed_1"),
+    ],
+)
+def test_the_script_starts_no_member_if_the_program_refuses_a_value(
+    tmp_path, scans, refused, engine
+):
+    """The values are checked before the folder and the list of members are written."""
+    (tmp_path / "gas.nml").write_text(GAS)
+    options = [word for scan in scans for word in ("--scan", scan)]
+    script = [ROOT / "runs/ensemble.sh", tmp_path / "gas.nml", "-d", tmp_path / "out"]
+    told = ran(*script, *options, "--seeds", "1-2", "--engine", engine)
+    assert told.returncode == 2 and told.stderr.count("\n") == 1
+    assert f"member {refused} cannot run: --set " in told.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("_tools")
 def test_members_that_did_not_finish_say_why(tmp_path):
     sweep(GAS, {"run.seed": [1, 2, 3]}, tmp_path)
     (tmp_path / "seed_1.h5").rename(tmp_path / "seed_1.h5.part")
