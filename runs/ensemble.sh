@@ -83,6 +83,7 @@ scan_seeds() {
     if [[ $part =~ ^(0|[1-9][0-9]{0,9})(-(0|[1-9][0-9]{0,9}))?$ ]]; then
       first=${BASH_REMATCH[1]} last=${BASH_REMATCH[3]:-${BASH_REMATCH[1]}}
     fi
+    [[ -z ${BASH_REMATCH[2]:-} ]] || ((first <= last)) || die "--seeds $1: in '$part' the first seed exceeds the last"
     ((first <= last)) ||
       die "--seeds $1: '$part' is neither a number nor a range such as 1-8 (no leading zeros)"
     ((${#list[@]} + last - first < most)) || die "--seeds $1: more than $most members"
