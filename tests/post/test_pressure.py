@@ -121,8 +121,13 @@ def test_the_means_are_over_time(tmp_path):
     kinetic, area = (0.5 * 1.5 + 1.5 * 3) / 2, 0.75
     assert run.pressure(0, 2) == pytest.approx((4 * kinetic + 6 / (2 * 2)) / area)
     assert run.pressure(0.5, 2) == pytest.approx((4 * 3 + 5 / (2 * 1.5)) / 0.6875)
-    for times in ((0, 0.1), (2, 0), (1, 1)):
-        with pytest.raises(RunError, match="no two samples"):
+    with pytest.raises(RunError, match="no two samples"):
+        run.pressure(0, 0.1)
+    for times in ((2, 0), (1, 1), (0, np.nan)):
+        with pytest.raises(RunError, match="must be below the second"):
+            run.pressure(*times)
+    for times in ((0, 1e9), (-1, 2), (0, 2.001), (5, 6)):
+        with pytest.raises(RunError, match="extends from t = 0 to 2, not from"):
             run.pressure(*times)
 
 

@@ -339,7 +339,8 @@ class Run(BoxResults):
         Raises
         ------
         RunError
-            if there are fewer than two samples of the observables
+            if the times are outside the run or not in increasing order, or if there are fewer than
+            two samples of the observables
 
         Examples
         --------
@@ -375,7 +376,8 @@ class Run(BoxResults):
         Raises
         ------
         RunError
-            if there is no virial tensor, or fewer than two samples of the observables
+            if there is no virial tensor, if the times are outside the run or not in increasing
+            order, or if there are fewer than two samples of the observables
 
         Examples
         --------
@@ -392,6 +394,14 @@ class Run(BoxResults):
     def _between(self, name: str, t1: float, t2: float) -> Series:
         """Return the samples of an observable between those closest in time to `t1` and `t2`."""
         time, value = self.observable(name)
+        if not t1 < t2:
+            raise RunError(f"{self.path}: the first time, {t1:g}, must be below the second, {t2:g}")
+        start, end = min(time[0], self.time[0]), max(time[-1], self.time[-1])
+        slack = 1e-9 * (end - start)  # for the rounding of times
+        if t1 < start - slack or t2 > end + slack:
+            raise RunError(
+                f"{self.path}: extends from t = {start:g} to {end:g}, not from {t1:g} to {t2:g}"
+            )
         first, last = (int(np.argmin(np.abs(time - t))) for t in (t1, t2))
         if not time[first] < time[last]:
             raise RunError(
