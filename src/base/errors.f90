@@ -1,4 +1,4 @@
-!> Error handling. A procedure that fails returns an allocated `error_t` to its caller; the error is
+!> Error handling. A procedure that fails returns an allocated `error_t` to its caller. The error is
 !> passed up to `main`, which prints the message.
 module errors
   use texts, only: legible

@@ -1,5 +1,5 @@
-!> Self-describing settings: a type lists the variables of its input group in one sequence of calls,
-!> each with the component that stores the value.
+!> Self-describing settings: a type lists the variables of its input group in a sequence of calls.
+!> Each call names a variable and the component that stores its value.
 module fields
   use kinds, only: int64, real64
   implicit none

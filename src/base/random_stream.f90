@@ -176,7 +176,7 @@ contains
     z = z*sqrt(-2*log(s)/s)
   end subroutine draw_normals
 
-  !> Draws a uniformly distributed point of the unit disk without its centre, and returns the
+  !> Draws a uniformly distributed point of the unit disk, excluding the centre. Also returns the
   !> squared distance of the point from the centre.
   pure subroutine draw_in_disk(stream, point, s)
     class(random_stream_t), intent(inout) :: stream

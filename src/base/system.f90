@@ -245,8 +245,8 @@ contains
     kind = trim(kinds_of_files(c_what_is(path//c_null_char)))
   end function what_is
 
-  !> Inode, size and modification time of a file, which together identify the file and its contents;
-  !> a copy has a different inode. The result is zero if the file does not exist.
+  !> Inode, size and modification time of a file. Together they identify the file and its contents,
+  !> because a copy has a different inode. The result is zero if the file does not exist.
   function identity_of(path) result(identity)
     character(len=*), intent(in) :: path
     integer(int64) :: identity(3)
