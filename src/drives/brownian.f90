@@ -52,7 +52,7 @@ contains
 
   !> Draws new velocities and angular velocities. In a sheared box the new velocities are relative
   !> to the velocity profile. The random numbers depend only on the seed, the id of the disk and the
-  !> number of the kick, not on the order of the disks or the history of the run.
+  !> number of the kick. They do not depend on the order of the disks or the history of the run.
   subroutine kick(self, sim, kicked)
     class(brownian_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
