@@ -52,8 +52,8 @@ contains
 
   !> At the present time, replaces the box, the contact law and the driving of a simulation by the
   !> box, contact law and driving of another input. The other input describes the same disks. Sides
-  !> start new motions from their present positions: at the present time, the old and the new law of
-  !> motion must give the same position.
+  !> start new motions from their present positions. At the present time, the old and the new law of
+  !> motion must therefore give the same position.
   subroutine change_system(sim, system, problem)
     type(simulation_t), intent(inout) :: sim
     type(system_t), intent(in) :: system

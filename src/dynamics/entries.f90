@@ -61,7 +61,8 @@ contains
   end function awaits_entry
 
   !> Lets disks enter through source s at its next time. The waiting disks are tried in the order of
-  !> their ids, until the maximum number of disks for this source have found a free position.
+  !> their ids, until the number of disks that have found a free position reaches the maximum for
+  !> this source.
   subroutine let_disks_enter(sim, s, entered)
     type(simulation_t), intent(inout) :: sim
     integer, intent(in) :: s                                 !! index of the source
@@ -99,8 +100,8 @@ contains
     entered = entered(:n)
   end subroutine let_disks_enter
 
-  !> Lets disk i enter at a free position, either with the velocity of the source and without
-  !> rotation, or with velocity and rotation from the Maxwell distribution. The orientation of the
+  !> Lets disk i enter at a free position. The disk receives either the velocity of the source and
+  !> no rotation, or a velocity and rotation from the Maxwell distribution. The orientation of the
   !> disk is kept.
   subroutine enter(sim, source, i, x, stream)
     type(simulation_t), intent(inout) :: sim

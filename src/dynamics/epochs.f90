@@ -40,8 +40,8 @@ module epochs
 
 contains
 
-  !> Chooses the length of the first epoch from an estimate of the event rate, and sets
-  !> `negligible_time`, in which no disk moves noticeably.
+  !> Chooses the length of the first epoch from an estimate of the event rate. Also sets
+  !> `negligible_time`, a duration in which no disk moves noticeably.
   pure subroutine begin_first_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: mean                           ! mean squared speed [length**2/time**2]
@@ -60,8 +60,9 @@ contains
     sim%events_then = sim%tally%events
   contains
 
-    !> Mean number of events of a disk per path length: collisions with walls, and with other disks
-    !> according to Henderson's equation of state (Molecular Physics 30, 971 (1975)).
+    !> Mean number of events of a disk per path length. Collisions with walls are counted, and
+    !> collisions with other disks according to Henderson's equation of state (Molecular Physics 30,
+    !> 971 (1975)).
     pure function events_per_path() result(rate)
       real(real64) :: rate                           !! [1/length]
       real(real64) :: packing
@@ -101,7 +102,7 @@ contains
 
   !> Ends the epoch and moves the time origin to about the present time, which preserves the
   !> precision of times. All events must then be predicted anew. For this reason the disks are also
-  !> sorted by cells at this time. The end of the next epoch is a fixed time and not a fixed number
+  !> sorted by cells at this time. The next epoch ends at a fixed time and not after a fixed number
   !> of events, so that all domains can independently end the epoch at the same time. An epoch can
   !> also be ended by a single event or a kick (see `ends_by_event` and `ends_by_kick`). A disk can
   !> then be much faster than before, so the time origin moves exactly to the present time.
@@ -276,11 +277,11 @@ contains
   end function unresolved_bounce
 
   !> True if all disks are at rest. A disk that bounces inelastically on a surface at rest makes
-  !> infinitely many bounces in a finite time, because their durations form a convergent series.
-  !> Under gravity a disk is therefore considered at rest if its last bounce was less than
-  !> `negligible_time` ago and its remaining bounces would end within `negligible_time`. Bounces
-  !> lower than an eighth of the spacing of the coordinates also count as rest, because rounding
-  !> errors can make them endless. Without gravity a disk is at rest if it does not move.
+  !> infinitely many bounces in a finite time, because the durations of the bounces form a
+  !> convergent series. Under gravity a disk is therefore considered at rest if its last bounce was
+  !> less than `negligible_time` ago and its remaining bounces would end within `negligible_time`.
+  !> Bounces lower than an eighth of the spacing of the coordinates also count as rest, because
+  !> rounding errors can make them endless. Without gravity a disk is at rest if it does not move.
   pure function is_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -301,8 +302,8 @@ contains
     end do
   end function is_at_rest
 
-  !> Whether all disks are at rest, and no gravity, shear, moving side, driving, source or scheduled
-  !> change can set them in motion.
+  !> Whether all disks are at rest, and nothing can set them in motion: no gravity, shear, moving
+  !> side, driving, source or scheduled change.
   pure function stays_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -316,9 +317,9 @@ contains
   !> several disks rest on sides, the result is the disk with the lowest id. The last event of this
   !> disk and its next bounce on a dissipative side are both within `negligible_time` of the present
   !> time. Its bounces are lower than the spacing of its coordinates. They are therefore not
-  !> resolved: they converge, and time stops advancing. The next bounce is computed here, because
-  !> the event that a disk stores depends on the search, and the parallel engine may not have
-  !> predicted any.
+  !> resolved: they converge, and time stops advancing. The next bounce is computed here. The stored
+  !> event of the disk cannot be used, because it depends on the search, and the parallel engine may
+  !> not have predicted any.
   pure function disk_on_side(sim) result(found)
     type(simulation_t), intent(in) :: sim
     integer(int32) :: found(2)                       !! index of the disk, and code of the side

@@ -134,8 +134,8 @@ contains
     end do
   end subroutine renew_all
 
-  !> Executes events until a limit is reached. After a stop request the procedure returns early;
-  !> some predictions may then be missing, but the state of the simulation is complete.
+  !> Executes events until a limit is reached. After a stop request the procedure returns early.
+  !> Some predictions may then be missing, but the state of the simulation is complete.
   subroutine advance(self, sim, limits, error, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -221,9 +221,9 @@ contains
     end subroutine read_ahead
   end subroutine advance
 
-  !> Hot path: executes one event after another until the number of events reaches `last_count`, the
-  !> next event is beyond the time limit, or the allowed iterations are used up. Rare operations are
-  !> left to the caller.
+  !> Hot path: executes one event after another. It ends when the number of events reaches
+  !> `last_count`, the next event is beyond the time limit, or the allowed iterations are used up.
+  !> Rare operations are left to the caller.
   subroutine run_events(self, sim, t_limit, iterations, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -356,8 +356,8 @@ contains
     end associate
   end subroutine follow_side
 
-  !> When a piston leaves its strip (the cells within its reach, see `piston_strips`), predicts the
-  !> events of the disks in the old and the new strip anew.
+  !> Called when a piston leaves its strip (the cells within its reach, see `piston_strips`).
+  !> Predicts the events of the disks in the old and the new strip anew.
   subroutine follow_piston(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

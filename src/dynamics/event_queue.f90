@@ -4,7 +4,7 @@
 !> Events of the current time window are kept in a short sorted list. If the list overflows, its
 !> events move to the heap, which is then used until the end of the window. Events of later windows
 !> are stored in the calendar, or in the heap if their bucket is full. Calendar entries are never
-!> searched for or removed individually; an entry is valid as long as it equals the event stored by
+!> searched for or removed individually. An entry is valid as long as it equals the event stored by
 !> its disk. Without the calendar, all events are in the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
@@ -409,8 +409,9 @@ contains
     end do
   contains
 
-    !> True if all events should be entered anew with another window width: the present width has
-    !> proved far too small or too large, and enough windows have passed since the last `fill`.
+    !> True if all events should be entered anew with another window width. The present width must
+    !> have proved far too small or too large, and enough windows must have passed since the last
+    !> `fill`.
     pure function ill_fitting() result(yes)
       logical :: yes
       real(real64) :: per_window

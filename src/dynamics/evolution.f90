@@ -87,9 +87,9 @@ contains
   end function reached
 
   !> True if a quantity that can change in any collision, such as the dissipated energy, has reached
-  !> its limit. Such a quantity must never decrease during a run. A parallel run detects an exceeded
-  !> limit only at the end of a time window, and then repeats the window to find the collision at
-  !> which the limit was reached.
+  !> its limit. Such a quantity must never decrease during a run. A parallel run detects only at the
+  !> end of a time window that a limit was exceeded. It then repeats the window to find the
+  !> collision at which the limit was reached.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally

@@ -117,8 +117,8 @@ contains
       yes = relative_energy(sim) < coldest*sim%reference_energy
   end function too_cold
 
-  !> True if a run is finished: a stop rule is met, rounding errors dominate the velocities, or no
-  !> further event can occur in a run without a time limit. Failures are reported by `timeline` and
+  !> True if a run is finished. A stop rule is met, rounding errors dominate the velocities, or the
+  !> run has no time limit and no further event can occur. Failures are reported by `timeline` and
   !> the evolution instead.
   pure function is_over(self, sim, evolution) result(yes)
     class(stop_rule_t), intent(in) :: self

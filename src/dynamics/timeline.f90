@@ -1,7 +1,7 @@
 !> Executes the actions that affect all disks at once, in a fixed order. At equal times, collisions
-!> come first, then scheduled changes, entries of disks, kicks, and finally the actions of the
-!> caller (samples, end of the run). The time origin moves at the end of an epoch, when no other
-!> action is in progress.
+!> come first. Scheduled changes, entries of disks and kicks follow in this order, and finally the
+!> actions of the caller (samples, end of the run). The time origin moves at the end of an epoch,
+!> when no other action is in progress.
 module timeline
   use encounters, only: encounter_text
   use box_geometry, only: wall_normal

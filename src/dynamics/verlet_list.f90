@@ -194,8 +194,8 @@ contains
 
   contains
 
-    !> Periodic image of a point inside the box, computed with real numbers, because a disk may have
-    !> crossed more periods than an integer can represent.
+    !> Periodic image of a point inside the box. The image is computed with real numbers, because a
+    !> disk may have crossed more periods than an integer can represent.
     pure function in_box(point) result(image)
       real(real64), intent(in) :: point(2)
       real(real64) :: image(2)
