@@ -2,7 +2,7 @@
 !> hard links.
 !>
 !> The first failure is recorded, and all later calls have no effect. A procedure that writes a file
-!> therefore need not test the result of every call; at the end, `report` returns the recorded
+!> therefore need not test the result of every call. At the end, `report` returns the recorded
 !> failure.
 module hdf5_handle
   use, intrinsic :: iso_c_binding, only: c_bool, c_int, c_int64_t

@@ -1,6 +1,6 @@
 !> Checkpoint records. A record is a sequence of numbers in one dataset, together with a checksum.
-!> The same sequence of calls counts, writes or reads the numbers, depending on the mode, so that
-!> the order of reading always equals the order of writing.
+!> Depending on the mode, the same sequence of calls counts, writes or reads the numbers. The order
+!> of reading therefore always equals the order of writing.
 module record
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_int8_t, c_loc, c_long, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8

@@ -8,9 +8,9 @@ module table_file
   public :: read_table
 
   interface
-    !> Reads a table. There are two implementations, of which the linker selects one: the submodule
-    !> `table_in_hdf5` reads the file; the submodule `table_without_hdf5` reports that HDF5 files
-    !> cannot be read.
+    !> Reads a table. There are two implementations, and the linker selects one of them. The
+    !> submodule `table_in_hdf5` reads the file; the submodule `table_without_hdf5` reports that
+    !> HDF5 files cannot be read.
     module subroutine read_table(path, names, widths, most, table, error)
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: names(:)                 !! names of the datasets
