@@ -281,8 +281,8 @@ contains
   end function covers
 
   !> Checks that the arc overlaps the box. Along a periodic axis the arc must not be wider than the
-  !> box, and its middle must be in the box; otherwise images shifted by more than one period could
-  !> touch disks in the box.
+  !> box, and the middle of the arc must be in the box. Otherwise images shifted by more than one
+  !> period could touch disks in the box.
   pure function misfit(self, lower, upper, periodic) result(problem)
     class(arc_t), intent(in) :: self
     real(real64), intent(in) :: lower(2), upper(2)

@@ -66,9 +66,9 @@ contains
     end if
   end function time_to_line
 
-  !> Time until the centre of a disk reaches a circle of radius rho about the origin, from inside if
-  !> `inside` is .true., otherwise from outside. The result is 0 if the centre is already on the
-  !> circle, or beyond it owing to rounding, and would cross it.
+  !> Time until the centre of a disk reaches a circle of radius rho about the origin. The disk comes
+  !> from inside if `inside` is .true., otherwise from outside. The result is 0 if the centre is
+  !> already on the circle, or beyond it owing to rounding, and would cross it.
   pure function time_to_circle(d, v, g, rho, inside, within) result(s)
     real(real64), intent(in) :: d(2)      !! centre of the disk relative to the centre of the circle [length]
     real(real64), intent(in) :: v(2)      !! [length/time]
@@ -109,10 +109,10 @@ contains
   end function time_to_circle
 
   !> True if an accelerated point certainly does not enter a circle about the origin during a given
-  !> time; it may start on the circle. The squared distance from the origin minus the squared radius
-  !> is a quartic polynomial in time. The values of a polynomial in an interval are never below the
-  !> smallest of its Bernstein coefficients, and the coefficients converge to the values when the
-  !> interval is halved repeatedly.
+  !> time. The point may start on the circle. The squared distance from the origin minus the squared
+  !> radius is a quartic polynomial in time. The values of a polynomial in an interval are never
+  !> below the smallest of its Bernstein coefficients. If the interval is halved repeatedly, the
+  !> coefficients converge to the values.
   pure function misses_circle(d, v, g, rho, within) result(yes)
     real(real64), intent(in) :: d(2), v(2), g(2), rho, within
     logical :: yes
@@ -172,8 +172,8 @@ contains
   !> quartic polynomial that vanishes at a contact. F is monotonic between the roots of its
   !> derivative F', and F' between the roots of F''. Each bisection therefore starts with an
   !> interval that contains exactly one root, so that the first contact cannot be missed. F is
-  !> calculated from the position at the time s and not from polynomial coefficients, whose rounding
-  !> errors could exceed the squared radius of a small circle.
+  !> calculated from the position at the time s. Polynomial coefficients are not used, because their
+  !> rounding errors could exceed the squared radius of a small circle.
   pure function time_to_circle_falling(d, v, g, rho, inside, skipped) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside

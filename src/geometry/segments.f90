@@ -75,7 +75,7 @@ contains
   contains
 
     !> Time until the centre of a disk reaches the straight side of the stadium in the direction
-    !> `across`; the result is `never` if the centre passes beyond an end of the wall. The distance
+    !> `across`. The result is `never` if the centre passes beyond an end of the wall. The distance
     !> is a quadratic function of time, so the side is reached from outside at most once.
     pure function time_to_side() result(t)
       real(real64) :: t, away, speed, fall, disc

@@ -114,7 +114,7 @@ contains
     magnitude = sqrt(v(1)*v(1) + v(2)*v(2))
   end function magnitude
 
-  !> Unit vector in the direction of v or, if v vanishes, of `otherwise`. A vanishing v occurs at
+  !> Unit vector in the direction of v or, if v vanishes, of `otherwise`. The vector v vanishes at
   !> the centre of a container hardly larger than a disk, and when a disk in a time-stepped
   !> simulation stops exactly on an obstacle.
   pure function unit_vector(v, otherwise) result(e)
@@ -134,10 +134,10 @@ contains
   end function unit_vector
 
   !> Vector to the point x from the middle of the nearest periodic image of the obstacle. The
-  !> distances of x from the outlines of all images are compared, because the nearest image of a
-  !> long wall is not always the one with the nearest middle. If x is equally distant from two
-  !> images, a disk at x may touch both; the image whose normal has the smallest angle to the vector
-  !> `heading` is then chosen.
+  !> distances of x from the outlines of all images are compared. The nearest image of a long wall
+  !> is not always the image with the nearest middle. If x is equally distant from two images, a
+  !> disk at x may touch both. The image whose normal has the smallest angle to the vector `heading`
+  !> is then chosen.
   pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
