@@ -1,5 +1,5 @@
-!> Reads the command line, whose file names may have any length, and prints the information
-!> requested by options such as --help.
+!> Reads the command line and prints the information requested by options such as --help. File names
+!> may have any length.
 module command_line
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use build_info, only: build_flags, git_commit

@@ -266,9 +266,9 @@ contains
   end subroutine infer_choices
 
   !> Checks the variables whose effect depends on choices. A variable required by a choice must be
-  !> set. The value of a variable without effect is removed; if the user has set it, an error is
-  !> reported, because no part of an input may be ignored silently. Variables that exclude each
-  !> other are also reported.
+  !> set. The value of a variable without effect is removed. If the user has set such a variable, an
+  !> error is reported, because no part of an input may be ignored silently. Variables that exclude
+  !> each other are also reported.
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems

@@ -16,8 +16,8 @@ module input_problems
     character(len=:), allocatable :: text
   end type problem_t
 
-  !> List of problems in the order in which they are reported: problems with single lines by line
-  !> number, then problems with the whole file, then problems with overrides.
+  !> List of problems in the order in which they are reported. Problems with single lines come
+  !> first, by line number; problems with the whole file and then problems with overrides follow.
   type :: problem_list_t
     integer :: count = 0
     integer :: unreadable = 0                   !! number of problems with unreadable files

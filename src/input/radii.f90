@@ -1,5 +1,5 @@
 !> Radii of the disks of a species: equal, or drawn from a distribution. The distribution is
-!> truncated so that the maximum radius is ten times the minimum; a radius outside these limits is
+!> truncated so that the maximum radius is ten times the minimum. A radius outside these limits is
 !> drawn again. Polydispersities that would often require redrawing are not allowed.
 module radii
   use kinds, only: int64, real64
