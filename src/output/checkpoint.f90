@@ -122,8 +122,8 @@ contains
     overrides = [overrides, given]
   end subroutine recall_overrides
 
-  !> Reads the text of the input from an output file and checks that it is undamaged and was written
-  !> by this version of the program.
+  !> Reads the text of the input from an output file. Checks that this text is undamaged and was
+  !> written by this version of the program.
   subroutine recall_input(file, text, overrides, changes, error)
     type(hdf5_file_t), intent(inout) :: file
     character(len=:), allocatable, intent(out) :: text, overrides

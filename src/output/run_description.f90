@@ -248,8 +248,8 @@ contains
   end subroutine describe_value
 
   !> Writes all groups of one name as a table, with a dataset for each variable. A variable with two
-  !> keywords becomes a dataset named after the second keyword, which contains 1 for groups with
-  !> this keyword and 0 for the others.
+  !> keywords becomes a dataset named after the second keyword. The dataset contains 1 for groups
+  !> with this keyword and 0 for the others.
   subroutine describe_table(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)
@@ -290,9 +290,10 @@ contains
     end do
   end subroutine describe_table
 
-  !> Writes a table of all obstacles in the groups of one name, in the order of their boundary ids:
-  !> the geometry of each obstacle and the number of its group. A table of the groups would not be
-  !> sufficient, because a file or a polyline describes several obstacles in one group.
+  !> Writes a table of all obstacles in the groups of one name, in the order of their boundary ids.
+  !> The table contains the geometry of each obstacle and the number of its group. A table of the
+  !> groups would not be sufficient, because a file or a polyline describes several obstacles in one
+  !> group.
   subroutine describe_rows(file, groups)
     type(hdf5_file_t), intent(inout) :: file
     type(group_t), intent(in) :: groups(:)

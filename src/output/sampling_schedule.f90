@@ -1,6 +1,6 @@
-!> Sampling schedules, and the progress of the output. Samples are due at multiples of a time, of a
-!> number of collisions or of a number of events, at given times, and at the start and the end of a
-!> run.
+!> Sampling schedules, and the progress of the output. Samples are due at the start and the end of a
+!> run, at given times, and at multiples of a time, of a number of collisions or of a number of
+!> events.
 module sampling_schedule
   use kinds, only: int64, never, real64
   use evolution, only: limits_t
@@ -206,9 +206,9 @@ contains
   end function next_number
 
   !> Number of samples of a run, or 0 if it is unknown at the start. The number is known if the
-  !> schedule has at most one interval and the only stop rule limits the same quantity: time,
-  !> collisions or events. With given or logarithmic sampling times, the limited quantity must be
-  !> the time.
+  !> schedule has at most one interval, and the only stop rule limits the quantity of this interval:
+  !> time, collisions or events. With given or logarithmic sampling times, the limited quantity must
+  !> be the time.
   elemental function planned(self, limits) result(n)
     class(schedule_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! limits of the run
