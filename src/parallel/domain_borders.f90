@@ -1,6 +1,6 @@
 !> Compares and corrects ghosts (copies of disks owned by neighbouring domains) after each time
 !> window. A ghost is wrong if its motion differed from the motion of its original. If a disk owned
-!> by the domain can have touched a wrong ghost, the window is invalid; otherwise the wrong ghosts
+!> by the domain can have touched a wrong ghost, the window is invalid. Otherwise the wrong ghosts
 !> are corrected. The page docs/explanation/algorithm.md proves that this criterion is sufficient.
 module domain_borders
   use kinds, only: int16, int32, int64

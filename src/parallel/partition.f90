@@ -227,10 +227,10 @@ contains
     call choose_target(self, sim, limits, plan)
   end subroutine begin_window
 
-  !> Chooses the time to which all domains advance next: the end of the window, unless the number of
-  !> events or collisions would exceed its limit earlier. Near a limit the domains first execute
-  !> most of the remaining events, and finally single events. The limit of iterations bounds the
-  !> work of each engine in case the estimated event rate is wrong.
+  !> Chooses the time to which all domains advance next. This is the end of the window, unless the
+  !> number of events or collisions would exceed its limit earlier. Near a limit the domains first
+  !> execute most of the remaining events, and finally single events. The limit of iterations bounds
+  !> the work of each engine in case the estimated event rate is wrong.
   subroutine choose_target(self, sim, limits, plan)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
