@@ -77,7 +77,7 @@ contains
   !> Transfers momentum between a disk and a piston. On entry the disk has the velocity after a
   !> collision with a piston of infinite mass. The procedure reduces its impulse to the value for
   !> the actual mass. On return u is the mean of the piston velocities before and after the
-  !> collision, with which the work of the piston is calculated.
+  !> collision. The work of the piston is calculated with this mean.
   pure subroutine move_piston(sim, i, code, normal, before, u, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code

@@ -389,8 +389,8 @@ contains
     yes = (min(disc, -2*b*s - c) < 0 .and. c > 0) .or. (is_round .and. b >= 0)
   end function passes_by
 
-  !> Version of `passes_by` for a falling point. Its parabolic path lies in the triangle formed by
-  !> the two ends of the path and the position that would be reached in half the time without
+  !> Version of `passes_by` for a falling point. Its parabolic path lies in a triangle. The corners
+  !> are the two ends of the path, and the position that would be reached in half the time without
   !> gravity. The circle misses the triangle if all three corners lie behind a line that is parallel
   !> or perpendicular to the chord between the two ends.
   pure function falls_past(d, v, g, s, rho) result(yes)

@@ -43,8 +43,8 @@ contains
   end function spans
 
   !> Corners of the rectangle available to the centres of disks in a region at a given time. A disk
-  !> with its centre in this rectangle is completely inside the region and overlaps no side, even if
-  !> a side is displaced from its mean position.
+  !> with its centre in this rectangle is completely inside the region and overlaps no side. This
+  !> also holds if a side is displaced from its mean position.
   pure subroutine centre_range(region, box, radius, lower, upper, t)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box

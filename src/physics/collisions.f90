@@ -147,7 +147,7 @@ contains
 
   !> Impulse on disk i, as a multiple q of the separation vector dx = x_j - x_i: v_i changes by q
   !> dx/m_i, and v_j by -q dx/m_j. The actual distance of the disks is used instead of the sum of
-  !> their radii, so that energy is conserved up to rounding errors.
+  !> their radii. Energy is then conserved up to rounding errors.
   pure function pair_impulse(b, distance2, mass_i, mass_j, restitution) result(q)
     real(real64), intent(in) :: b                    !! dx . dv [length**2/time]
     real(real64), intent(in) :: distance2            !! dx . dx [length**2]

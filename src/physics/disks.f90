@@ -78,8 +78,8 @@ module disks
     real(real64) :: angle = 0.0_real64          !! orientation at `clock`, unwrapped [radian]
   end type extra_t
 
-  !> Membership of a disk in a series of collisions, which occur at one and the same time and are
-  !> connected by common disks (see `collapses`).
+  !> Membership of a disk in a series of collisions. The collisions of a series occur at one and the
+  !> same time and are connected by common disks (see `collapses`).
   type :: series_t
     real(real64) :: time = -never               !! time of the last series, relative to `box%epoch` [time]
     !> Id of a disk of the same series. Following these ids from disk to disk leads to the disk that
@@ -133,9 +133,9 @@ contains
     disk%collision_counter = disk%collision_counter + 1
   end subroutine advance_disk
 
-  !> Number of the first multiple of the interval after a given time and between the start and the
-  !> end of the source; 0 if there is none. A multiple within a few rounding errors of the start or
-  !> the end counts as inside (3 x 0.1 > 0.3 in double precision).
+  !> Number of the first multiple of the interval that is after a given time and between the start
+  !> and the end of the source; 0 if there is none. A multiple within a few rounding errors of the
+  !> start or the end counts as inside (3 x 0.1 > 0.3 in double precision).
   pure function next_multiple(self, after) result(k)
     class(source_t), intent(in) :: self
     real(real64), intent(in) :: after             !! since the start of the run [time]

@@ -330,9 +330,10 @@ contains
     dv(1) = dv(1) + image%velocity
   end subroutine use_nearest_image
 
-  !> True if disks i and j, touching at the time t, are still in contact after their last collision,
-  !> through the same periodic image. Free disks can approach each other after such a collision only
-  !> because of a rounding error, which arises when one of them is shifted by a period.
+  !> True if disks i and j, touching at the time t, are still in contact after their last collision.
+  !> The contact must be through the same periodic image. Free disks can approach each other after
+  !> such a collision only because of a rounding error, which arises when one of them is shifted by
+  !> a period.
   pure function are_in_contact(sim, i, j, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j

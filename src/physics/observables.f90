@@ -238,8 +238,8 @@ contains
   end function total
 
   !> Adds a term to the energy by compensated summation (Neumaier, ZAMM 54, 39 (1974)). The energy
-  !> gained from driving can be small compared with the total energy of many disks; simple summation
-  !> would lose some of its digits.
+  !> gained from driving can be small compared with the total energy of many disks. Simple summation
+  !> would lose some digits of this gain.
   pure subroutine add_energy(sums, term)
     real(real64), intent(inout) :: sums(:)
     real(real64), intent(in) :: term

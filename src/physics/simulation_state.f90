@@ -17,8 +17,8 @@ module simulation_state
 
   !> Driving: kicks at multiples of a time interval, which change velocities or positions of disks.
   !> Each kind of driving extends this type in a file of the folder `drives`. The abstract type is
-  !> defined here because the definitions depend on each other: a kick changes a simulation, and a
-  !> simulation contains its driving.
+  !> defined here, because a kick changes a simulation and a simulation contains its driving.
+  !> Neither can be defined before the other.
   type, abstract :: drive_t
     real(real64) :: interval = never              !! time between kicks [time]
     integer :: species = 0                        !! index of the only driven species; 0 for all species

@@ -17,8 +17,8 @@ module tally
     integer :: kind                                !! kind of the terms of the sum, such as `energies`
   end type sum_t
 
-  !> Indices of the sums over collisions in the list `sums`, which determines their units and their
-  !> order in checkpoints and in the exchange between domains.
+  !> Indices of the sums over collisions in the list `sums`. This list determines the units of the
+  !> sums, and their order in checkpoints and in the exchange between domains.
   integer, parameter, public :: virial = 1, dissipated = 2, heat = 3, work = 4, drive_energy = 5, stress = 6
   ! stress has four components, heat_virial two
   integer, parameter, public :: heat_virial = 10, flux_changes = 12
