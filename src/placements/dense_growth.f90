@@ -1,9 +1,9 @@
 !> Dense random packings by Lubachevsky-Stillinger compression (Lubachevsky and Stillinger, 1990,
 !> doi:10.1007/BF01025983): initially small disks move as an elastic gas and grow to their full
-!> size. The original algorithm grows the disks continuously. Here, short runs of event-driven
-!> dynamics at constant size alternate with growth steps, in which every disk grows into the gap
-!> between it and its neighbours. If initial positions are given, the disks start there with the
-!> largest size at which they do not overlap.
+!> size. The original algorithm grows the disks continuously. Here, the disks move in short runs of
+!> event-driven dynamics at constant size. These runs alternate with growth steps, in which every
+!> disk grows into the gap between it and its neighbours. If initial positions are given, the disks
+!> start there with the largest size at which they do not overlap.
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap

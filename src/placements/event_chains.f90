@@ -8,21 +8,21 @@
 !> the positions of all disks and the index of the moving disk. Each state has exactly one
 !> predecessor, and the motion preserves the volume in the space of states. Therefore the uniform
 !> distribution of all packings is stationary (global balance), although no chain moves backwards.
-!> Two conditions are required for this: the first disk of each chain is drawn uniformly from all
+!> Two conditions are required for this. The first disk of each chain is drawn uniformly from all
 !> disks, and the length of the chain is independent of the positions.
 !>
 !> Along an axis with walls, a disk that reaches a side reverses its direction and continues
 !> (straight event chains in a box with walls, Li et al., 2022, doi:10.1063/5.0126437). The state of
-!> a chain then includes the direction. Each state still has exactly one predecessor: a disk that
-!> touches a side and moves away from it must have been reflected just before. The initial direction
-!> is drawn at random, because the uniform distribution is stationary only if both directions are
-!> equally probable. A chain between two sides, reversed at its end, leads back to its start. Such
-!> chains therefore also satisfy detailed balance.
+!> a chain then includes the direction. Each state still has exactly one predecessor, because a disk
+!> that touches a side and moves away from it must have been reflected just before. The initial
+!> direction is drawn at random, because the uniform distribution is stationary only if both
+!> directions are equally probable. A chain between two sides, reversed at its end, leads back to
+!> its start. Such chains therefore also satisfy detailed balance.
 !>
-!> If the radii differ, a swap is attempted after each chain: two disks, drawn uniformly from all
-!> disks, exchange their positions unless the larger one would overlap another disk or a side
-!> (Grigera and Parisi, 2001, doi:10.1103/PhysRevE.63.045102). Swaps satisfy detailed balance,
-!> because the two disks are drawn independently of the positions.
+!> If the radii differ, a swap is attempted after each chain (Grigera and Parisi, 2001,
+!> doi:10.1103/PhysRevE.63.045102). Two disks, drawn uniformly from all disks, exchange their
+!> positions unless the larger one would overlap another disk or a side. Swaps satisfy detailed
+!> balance, because the two disks are drawn independently of the positions.
 module event_chains
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
@@ -180,7 +180,7 @@ contains
         sense = -sense
         bounces = bounces + 1
         ! A disk that moves back and forth between two sides without touching another disk repeats
-        ! its motion; whole periods are skipped.
+        ! its motion. Whole periods of this motion are skipped.
         if (bounces == 2) left = modulo(left, max(2*room(packing, k, axis, sense), tiny(left)))
       end if
       step = step + 1

@@ -51,8 +51,9 @@ contains
   end subroutine place
 
   !> Positions on a triangular lattice, row by row from the bottom. The lattice is stretched along
-  !> one axis to fill the region; the number of rows is chosen to maximise the distance between
-  !> neighbours. If there are more lattice sites than disks, the last sites remain empty.
+  !> one axis to fill the region. The number of rows is chosen such that the distance between
+  !> neighbours is as large as possible. If there are more lattice sites than disks, the last sites
+  !> remain empty.
   pure subroutine find_lattice(region, box, count, radius, x, misfit)
     real(real64), intent(in) :: region(4)                   !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box

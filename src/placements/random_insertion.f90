@@ -1,10 +1,10 @@
-!> Random sequential insertion: each disk is inserted at a random point, drawn uniformly from all
-!> points where it fits between the disks inserted earlier. The region is divided into small
-!> rectangles called voxels. A voxel is eliminated if a single disk prevents the centre of a new
-!> disk from lying anywhere in it. Points are drawn only from the remaining voxels, which are halved
-!> along both axes when attempts fail too often. Attempts in eliminated voxels would always fail.
-!> The distribution is therefore the same as in simple insertion, but saturation can be reached
-!> (Zhang and Torquato, 2013, doi:10.1103/PhysRevE.88.053312).
+!> Random sequential insertion: each disk is inserted at a random point. The point is drawn
+!> uniformly from all points where the disk fits between the disks inserted earlier. The region is
+!> divided into small rectangles called voxels. A voxel is eliminated if a single disk prevents the
+!> centre of a new disk from lying anywhere in it. Points are drawn only from the remaining voxels,
+!> which are halved along both axes when attempts fail too often. Attempts in eliminated voxels
+!> would always fail. The distribution is therefore the same as in simple insertion, but saturation
+!> can be reached (Zhang and Torquato, 2013, doi:10.1103/PhysRevE.88.053312).
 !>
 !> Disks of different radii are inserted in the order of decreasing radius. For different radii the
 !> insertion ends after many failed attempts. No voxels are eliminated then, because a voxel without
@@ -166,7 +166,7 @@ contains
   end function chosen
 
   !> Permutation that sorts the disks by decreasing radius. Radii are compared with a resolution of
-  !> a thousandth of their range; within this resolution disks keep their original order.
+  !> a thousandth of their range. Within this resolution disks keep their original order.
   pure function largest_first(radius) result(order)
     real(real64), intent(in) :: radius(:)           !! [length]
     integer(int32), parameter :: classes = 1000

@@ -1,5 +1,5 @@
-!> Placement in equilibrium: the disks of all species are placed together, by compression or on a
-!> lattice, and then equilibrated by event chains (see `event_chains`).
+!> Placement in equilibrium. The disks of all species are placed together, by compression or on a
+!> lattice, and are then equilibrated by event chains (see `event_chains`).
 module relaxed_placement
   use box_geometry, only: box_t
   use dense_placement, only: dense_placement_t, growth_box
