@@ -121,8 +121,8 @@ contains
   end subroutine set
 
   !> Finds the columns and rows in which a piston may touch disks before it has moved by one cell
-  !> width. The outermost cells also contain the disks beyond the grid, so a piston outside the grid
-  !> may touch the disks in these cells.
+  !> width. The outermost cells also contain the disks beyond the grid. A piston outside the grid
+  !> may therefore touch the disks in these cells.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
     type(box_t), intent(in) :: box
@@ -203,8 +203,8 @@ contains
     cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), gravity(2), s, cell(2))
   end subroutine choose_cell
 
-  !> Change of the column or row of a disk along one axis: 1 or -1 if the next cell in the direction
-  !> of motion also contains the disk, otherwise 0.
+  !> Change of the column or row of a disk along one axis. The change is 1 or -1 if the next cell in
+  !> the direction of motion also contains the disk, otherwise 0.
   pure function ahead(line, overlap, x, v, g, s, cell) result(step)
     type(line_t), intent(in) :: line(0:1, *)
     real(real64), intent(in) :: overlap, x, v, g, s
@@ -245,8 +245,8 @@ contains
     end if
   end subroutine next
 
-  !> Finds the earliest event at which the disk reaches one of four lines around it: the faces of
-  !> its cell, or closer lines that bound its neighbourhood.
+  !> Finds the earliest event at which the disk reaches one of four lines around it. The lines are
+  !> the faces of its cell, or closer lines that bound its neighbourhood.
   pure subroutine next_within(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
     type(box_t), intent(in) :: box

@@ -16,9 +16,9 @@ module cell_layout
   !> Maximum number of big disks, each of which is tested against all others.
   integer(int32), parameter :: most_big_disks = 256
 
-  !> A rectangular block of cells: usually all cells of the box; in a parallel run, the cells of a
-  !> domain and its halo, possibly across a periodic side. A disk that crosses an outer face leaves
-  !> the block, unless the face is a side of the box.
+  !> A rectangular block of cells. Usually the block contains all cells of the box. In a parallel
+  !> run it contains the cells of a domain and its halo, possibly across a periodic side. A disk
+  !> that crosses an outer face leaves the block, unless the face is a side of the box.
   type :: cell_layout_t
     integer(int32) :: whole(2) = 0                 !! numbers of columns and rows in the whole box
     !> First column and row of the block; below 1 if the block starts beyond a periodic side of the
@@ -63,8 +63,8 @@ contains
     layout%small = small
   end function whole_box
 
-  !> Radius that determines the width of the cells: the maximum of all radii or, if a few disks are
-  !> much bigger, of the radii of the small disks.
+  !> Radius that determines the width of the cells. It is the maximum of all radii or, if a few
+  !> disks are much bigger, the maximum radius of the small disks.
   pure function largest_small_radius(disk) result(radius)
     type(disk_t), intent(in) :: disk(:)
     real(real64) :: radius, next

@@ -2,10 +2,10 @@
 !> number is unbounded (inelastic collapse).
 !>
 !> The disks of such a cluster move so little that the normals of their contacts hardly change. The
-!> state of the cluster is therefore described not by positions and velocities but by the gap of
-!> each contact and the velocity at which the gap closes. In a collapse these numbers decrease by
-!> hundreds of powers of ten. The gaps and velocities remain exact to rounding, whereas differences
-!> of positions would soon be smaller than the rounding errors of the positions.
+!> state of the cluster is therefore not described by positions and velocities. It is described by
+!> the gap of each contact and the velocity at which the gap closes. In a collapse these numbers
+!> decrease by hundreds of powers of ten. The gaps and velocities remain exact to rounding.
+!> Differences of positions would soon be smaller than the rounding errors of the positions.
 !>
 !> Motion along the surfaces is included to first order. Two disks at a distance r that slip past
 !> each other with velocity w separate with the acceleration w**2/r (Zhou and Kadanoff, Physical

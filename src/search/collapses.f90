@@ -2,11 +2,11 @@
 !> Counts simultaneous collisions, which occur at exactly the same time.
 !>
 !> A collision may be part of a collapse if the gap between the two disks was negligible even before
-!> they approached each other. The simulation alone cannot decide this: near a limit of collapse,
+!> they approached each other. The simulation alone cannot decide this. Near a limit of collapse,
 !> rounding errors of the positions, or of a common velocity, dominate the motion before time stops
 !> advancing. The disks that almost touch are therefore copied to a cluster, whose collisions are
 !> followed without such errors (see `clusters`). The decision depends only on the state at the
-!> collision, and not on the search, the number of threads or the pauses of the run.
+!> collision. It does not depend on the search, the number of threads or the pauses of the run.
 module collapses
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: tangential_surface_velocity, wall_normal
@@ -179,8 +179,8 @@ contains
     end do
   end subroutine judge
 
-  !> Lists the disks of the cluster around disks i and j, in the order of their ids: all disks
-  !> connected with disk i by gaps of at most `reach`.
+  !> Lists the disks of the cluster around disks i and j, in the order of their ids. The cluster
+  !> contains all disks connected with disk i by gaps of at most `reach`.
   subroutine find_members(sim, i, j, t, member, n)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j

@@ -50,21 +50,21 @@ contains
   !> Contact times before `now` result from rounding errors. For example, the distance of two disks
   !> after a perfectly inelastic collision equals the sum of their radii only within rounding
   !> errors. These errors change when one disk is shifted by a period. Such a contact occurs either
-  !> at `now` or not at all. Later predictions lead to the same decision: the shift of a disk is
+  !> at `now` or not at all. Later predictions lead to the same decision. The shift of a disk is
   !> itself an event, after which its contacts are predicted anew.
   !>
   !> The contact time s is the first root of |dx + dv s| = sigma. The root is calculated as s =
-  !> c/(sqrt(disc) - b), with b = dx . dv and c = dx**2 - sigma**2, which avoids cancellation for
-  !> disks close to contact. The discriminant is calculated as disc = sigma**2 dv**2 - (dx x dv)**2,
-  !> which avoids cancellation for distant disks that graze each other. If two approaching disks
-  !> touch, or overlap owing to rounding errors, they collide at `now`.
+  !> c/(sqrt(disc) - b), with b = dx . dv and c = dx**2 - sigma**2. This form avoids cancellation
+  !> for disks close to contact. The discriminant is calculated as disc = sigma**2 dv**2 - (dx x
+  !> dv)**2. This form avoids cancellation for distant disks that graze each other. If two
+  !> approaching disks touch, or overlap owing to rounding errors, they collide at `now`.
   !>
-  !> A single test excludes most candidates. The test combines three conditions: the root must be
-  !> real, it must be earlier than the earliest contact found so far, and it must be earlier than
-  !> the next event of the candidate. (A later contact need not be predicted, because the pair is
-  !> tested again at that event.) If the root is earlier than a time t, then c < -2 b (t - late),
-  !> where `late` is the later clock of the two disks. This inequality is tested with a margin
-  !> larger than all rounding errors.
+  !> A single test excludes most candidates. The test combines three conditions. The root must be
+  !> real, and it must be earlier than the earliest contact found so far and than the next event of
+  !> the candidate. (A later contact need not be predicted, because the pair is tested again at that
+  !> event.) If the root is earlier than a time t, then c < -2 b (t - late), where `late` is the
+  !> later clock of the two disks. This inequality is tested with a margin larger than all rounding
+  !> errors.
   pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, with indices from 0
     type(tag_t), intent(in) :: tag(*)
@@ -169,7 +169,8 @@ contains
   end function event_of
 
   !> True if event a precedes the simultaneous event b. Simultaneous events are ordered by the lower
-  !> id of their two disks, then by the higher one, which is 0 for events of a single disk.
+  !> id of their two disks, then by the higher id. For an event of a single disk, 0 is used in place
+  !> of the higher id.
   pure function wins(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
     type(tag_t), intent(in) :: tag(*)

@@ -1,12 +1,12 @@
 !> Neighbour lists. The list of a disk contains the disks that it could touch while the centres of
 !> both stay within their neighbourhoods.
 !>
-!> The neighbourhood of a disk is a square around the position at which its list was made, clipped
-!> at the faces of its cell and at the sides of the box. When the centre of the disk leaves this
-!> square, which is an event, its list expires. A new list and a new neighbourhood are then made
-!> from the 3 x 3 cells around the disk. A prediction therefore tests only a few neighbours, however
-!> many disks the cells contain (Donev, Torquato and Stillinger, Journal of Computational Physics
-!> 202, 737 (2005)).
+!> The neighbourhood of a disk is a square around the position at which the list of the disk was
+!> made. The square is clipped at the faces of the cell and at the sides of the box. When the centre
+!> of the disk leaves this square, which is an event, its list expires. A new list and a new
+!> neighbourhood are then made from the 3 x 3 cells around the disk. A prediction therefore tests
+!> only a few neighbours, however many disks the cells contain (Donev, Torquato and Stillinger,
+!> Journal of Computational Physics 202, 737 (2005)).
 !>
 !> Lists save time but do not change the results. A list without space for another neighbour is
 !> marked as incomplete. Until the disk receives a new list, its predictions search the 3 x 3 cells
@@ -315,8 +315,8 @@ contains
     self%extent(4, i) = own(4)
   contains
 
-    !> Adds the disks in the linked list of a crowded cell to the neighbour list of disk i, except
-    !> the first one, which was already added because it is also in the last slot.
+    !> Adds the disks in the linked list of a crowded cell to the neighbour list of disk i. The
+    !> first of these disks is left out, because it was already added from the last slot.
     subroutine add_chain(c, image)
       integer(int32), intent(in) :: c, image
       integer(int32) :: j

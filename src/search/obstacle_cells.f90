@@ -1,4 +1,4 @@
-!> Lists of obstacles for all cells of the box: the list of a cell contains the obstacles that a
+!> Lists of obstacles for all cells of the box. The list of a cell contains the obstacles that a
 !> disk centred in the cell may overlap. The cost of testing a point for overlaps then does not
 !> depend on the number of obstacles. The cost of making the lists is proportional to this number.
 module obstacle_cells

@@ -23,8 +23,8 @@ module packing
     integer(int32), allocatable :: head(:, :)       !! first disk in each cell; 0 if the cell is empty
   end type layer_t
 
-  !> A placed disk. Neighbours in space are usually far apart in memory, so all data of a disk are
-  !> stored in one record, which costs a single cache line.
+  !> A placed disk. Neighbours in space are usually far apart in memory. All data of a disk are
+  !> therefore stored in one record, which costs a single cache line.
   type :: placed_t
     real(real64) :: x(2) = 0.0_real64               !! centre [length]
     real(real64) :: radius = 0.0_real64             !! [length]
@@ -202,7 +202,8 @@ contains
   end subroutine find_contact
 
   !> Version of `find_contact` for the disks of species s. Columns or rows of cells perpendicular to
-  !> the motion are searched one by one, until the next one is beyond the contact found so far.
+  !> the motion are searched one by one. The search ends when the next column or row is beyond the
+  !> contact found so far.
   pure subroutine search_ahead(packing, s, k, way, distance, partner)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
