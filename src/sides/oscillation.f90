@@ -1,9 +1,9 @@
 !> Oscillations of a side about its mean position.
 !>
 !> As long as the acceleration of a disk relative to the side keeps its sign, the gap between them
-!> is a convex or concave function of time, whose first zero can be bracketed. A period of the
-!> oscillation consists of a few such intervals. Therefore no contact can be missed, even if side
-!> and disk stay close together for a long time.
+!> is a convex or concave function of time. The first zero of such a function can be bracketed. A
+!> period of the oscillation consists of a few such intervals. Therefore no contact can be missed,
+!> even if side and disk stay close together for a long time.
 module oscillation
   use fields, only: fields_t
   use free_flight, only: flight, flight_velocity, time_to_line
@@ -190,8 +190,8 @@ contains
     end do
   end function contact_time
 
-  !> Time of contact in an interval in which the gap, as a function of time, is convex or concave;
-  !> the result is `never` if there is no contact.
+  !> Time of contact in an interval in which the gap is a convex or concave function of time. The
+  !> result is `never` if there is no contact.
   pure function first_contact(self, tau, gap, disk, from, to) result(s)
     class(oscillation_t), intent(in) :: self
     real(real64), intent(in) :: tau, gap             !! as in `contact_time`

@@ -1,5 +1,5 @@
-!> A side that strikes each disk with a constant velocity but stays in place: the limit of fast
-!> oscillations of small amplitude.
+!> A side that strikes each disk with a constant velocity but stays in place. This is the limit of
+!> fast oscillations of small amplitude.
 module sawtooth
   use fields, only: fields_t
   use kinds, only: never, real64
