@@ -1,4 +1,4 @@
-!> Checks the geometry of the system: the obstacles and regions must lie inside the box, and the
+!> Checks the geometry of the system. The obstacles and regions must lie inside the box, and the
 !> disks must fit into their regions. Each problem is reported with the responsible line of the
 !> input file.
 module input_fit

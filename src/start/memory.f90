@@ -1,5 +1,5 @@
 !> Checks that a run fits into the free memory of the computer, or into the memory granted by a
-!> batch system; otherwise the run is refused before it starts. If memory suffices only without
+!> batch system. Otherwise the run is refused before it starts. If memory suffices only without
 !> domains, the run uses the serial engine. The free memory is known only on Linux; on other systems
 !> every run is accepted.
 module memory
@@ -16,7 +16,7 @@ module memory
   public :: check_memory, free_memory, memory_needed, peak, room_for_domains
 
   !> Contributions to the peak of the resident memory, in bytes per disk, per obstacle and per
-  !> process; they agree with measurements by `runs/memory.sh` within 5 %. For time-stepped dynamics
+  !> process. They agree with measurements by `runs/memory.sh` within 5 %. For time-stepped dynamics
   !> they are upper bounds, because the length of the Verlet lists depends on the time step.
   integer(int64), parameter :: per_process = 10000000, per_obstacle = 580
   !> State and next event of a disk (`record`); cell of the neighbour search (`cell`).
@@ -156,7 +156,7 @@ contains
   end function crowding
 
   !> Available memory in bytes: the smaller of the free memory of the computer and the limit of the
-  !> control group, beyond which the operating system kills a batch job without a message. The
+  !> control group. Beyond this limit the operating system kills a batch job without a message. The
   !> result is huge if neither is known.
   function free_memory(root) result(bytes)
     !> Root folder of the file system; empty except in tests.

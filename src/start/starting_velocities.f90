@@ -35,8 +35,8 @@ contains
 
   !> Generates the initial velocities of all disks. If no boundary or force can change the total
   !> momentum, the total momentum of generated velocities is set to zero. In a sheared box,
-  !> generated velocities and temperatures are relative to the shear flow, while explicit velocities
-  !> are absolute.
+  !> generated velocities and temperatures are relative to the shear flow. Explicit velocities are
+  !> absolute.
   subroutine draw_initial_velocities(settings, groups, sim, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)                  !! groups of the species
@@ -113,7 +113,7 @@ contains
   end subroutine draw_velocities
 
   !> Draws unit vectors in random directions. The indices of disks with opposite velocities differ
-  !> by half the number of disks, so that these disks are not neighbours on an initial grid.
+  !> by half the number of disks. These disks are therefore not neighbours on an initial grid.
   subroutine draw_directions(self, in_pairs, disk)
     class(drawing_t), intent(inout) :: self
     logical, intent(in) :: in_pairs
