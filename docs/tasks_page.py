@@ -45,7 +45,8 @@ with smooth walls (ξ = 0.8, eight seeds).
   not depend on the speed.
 - *Radius.* In a large bed the crater shrinks slowly with the radius of the projectile. In a small
   bed it grows with the radius, because a small projectile reaches the floor and loses its energy
-  there. The same happens at the open points of the figure, which shows only beds of 2000 grains.
+  there. This also happens at the open points of the figure, although all its beds have 2000
+  grains.
 - *Restitution.* As ξ approaches 1 the crater grows to the whole bed.
 
 | grains in the bed | hit with radius 2 | radius 5 | radius 10 |
@@ -56,7 +57,7 @@ with smooth walls (ξ = 0.8, eight seeds).
 How large must the bed be? About 7.5 M (1/f - 1)/(1 - ξ²) grains are needed, where M is the mass
 ratio and f the fraction of the energy that is left at the end. Here the estimate is 2250 grains.
 The slightly smaller bed of 2000 grains is acceptable, because fewer than 20 collisions with walls
-occur. Up to this limit the scripts include a crater in the fit (filled symbols).
+occur. The scripts exclude a crater with more wall collisions from the fit (open symbols).
 """,
     "energy": """\
 The total energy of all methods is constant to {energy_change}. The table lists the missed
@@ -69,8 +70,8 @@ collisions in per cent (32 pairs of runs of 520 s).
 | 0.004 | {missed_0.004} | {expected_0.004} |
 """,
     "equipartition": """\
-For the earliest of the four v₀, the mean energies of both species agree within 10 % from
-({T_first}) s on, and for the latest from ({T_last}) s on. The time hardly depends on v₀.
+After a time T, the mean energies of both species agree within 10 %. Among the four v₀ the shortest
+T is ({T_first}) s, and the longest T is ({T_last}) s. The time hardly depends on v₀.
 """,
     "laws": """\
 The table lists slopes measured with seed 1, divided by those of the exponential laws. The dashed
