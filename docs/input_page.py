@@ -46,7 +46,7 @@ GROUPS = {
     "repeated ([changes during a run](../../guides/changes.md)).",
     "stop": "The group `&stop` sets the rules that end the run. At least one is needed, and the "
     "run ends when the first of them is met. If no further event can occur and no `time` is given, "
-    "it ends at the last collision, or at the next sample after it.",
+    "the run ends at the last collision, or at the next sample after this collision.",
     "output": "The group `&output` determines the contents of the output file and the times of "
     "frames and samples. The initial and the final state are always written. Averages over samples "
     "at intervals of collisions or events differ from time averages by a relative amount of order "

@@ -150,8 +150,8 @@ int ricochet_text(ricochet *, const char *what, char *text, int room);
    most:     maximum number of events
    records:  for each event, the time, i and j, and the magnitude and the two components of the momentum change of disk i,
              as in the event log of a run
-   Returns the number of predicted events, which is less than `most` if no event occurs for a long time, or -1 in a
-   time-stepped simulation, which cannot predict events. */
+   Returns the number of predicted events. This number is less than `most` if no event occurs for a long time. Returns
+   -1 in a time-stepped simulation, which cannot predict events. */
 int ricochet_next_events(ricochet *, int most, double records[][6]);
 
 /* --- Only in libricochet_files.so --- */

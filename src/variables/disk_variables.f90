@@ -112,19 +112,19 @@ module disk_variables
       "Contact duration t_c of the TC model, which prevents inelastic collapse: a collision is elastic if one of its partners " &
       //"collided less than t_c ago. 0 switches the model off. Choose t_c far below the mean time between collisions and, for " &
       //"grains of diameter d resting under gravity g, below sqrt(d/g). The model does not prevent the collapse of resting " &
-      //"grains with friction or with a tangential restitution between -1 and 1, which dissipate energy even in these elastic " &
+      //"grains with friction or with a tangential restitution between -1 and 1: these dissipate energy even in such elastic " &
       //"collisions. Not available with stop.at_rest.", &
       not_negative, "time", may_change=in_motion), &
     variable_t("contact", "tangential_restitution", "real", 1, "default", "-1", &
       "Coefficient of tangential restitution of disk-disk collisions: -1 for smooth surfaces, 0 if collisions stop the slip, " &
       //"1 if they reverse it. Above -1 the disks are rough and rotate. Values between -1 and 1 dissipate energy even in " &
-      //"collisions that the TC model (contact_time) makes elastic, so that grains resting in a dense bed collapse or collide " &
+      //"collisions that the TC model (contact_time) makes elastic. Grains resting in a dense bed then collapse or collide " &
       //"millions of times; use -1 or 1 for such grains.", &
       tangential, may_change=in_motion), &
     variable_t("contact", "friction", "real", 1, "optional", "0.3", &
       "Coulomb friction coefficient of disk-disk collisions: upper limit of the ratio of tangential to normal impulse. Needs " &
       //"rough disks (tangential_restitution > -1). Friction dissipates energy even in collisions that the TC model " &
-      //"(contact_time) makes elastic, so that grains resting in a dense bed collapse or collide millions of times; use " &
+      //"(contact_time) makes elastic. Grains resting in a dense bed then collapse or collide millions of times; use " &
       //"tangential_restitution = 1 without friction for such grains.", &
       not_negative, may_change=in_motion, &
       otherwise="the tangential impulse has no limit"), &

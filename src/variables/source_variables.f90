@@ -27,8 +27,8 @@ module source_variables
       "Velocity (x, y) of entering disks, which do not rotate. Either velocity or temperature must be given.", unit="length/time", &
       excludes="temperature", may_change=in_motion, otherwise="none; temperature or velocity must be given"), &
     variable_t("source", "temperature", "real", 1, "example", "1", &
-      "Temperature kT of the Maxwell distribution of entering disks, from which their velocities and, if disks rotate, their " &
-      //"angular velocities are drawn.", positive, "energy", may_change=in_motion, &
+      "Temperature kT of the Maxwell distribution from which the velocities of entering disks are drawn. If disks rotate, " &
+      //"it is also the temperature of their angular velocities.", positive, "energy", may_change=in_motion, &
       otherwise="none; temperature or velocity must be given"), &
     variable_t("source", "start_time", "real", 1, "default", "0", &
       "Earliest time at which disks enter.", not_negative, "time", may_change=in_motion), &
