@@ -21,7 +21,7 @@ from collections import Counter
 from pathlib import Path
 
 from ricochet.analysis.cooling import FlowShare, flow_share
-from ricochet.reading.files import destination
+from ricochet.reading.files import counted, destination
 from ricochet.reading.reader import read_run
 from ricochet.running.ensembles import gathered
 from ricochet.script import launch
@@ -62,7 +62,7 @@ def main() -> None:
         table.writerows(rows)
     states = Counter(row["state"] for row in rows)
     told = ", ".join(f"{number} {state}" for state, number in sorted(states.items()))
-    print(f"{args.folder}: {len(rows)} members: {told}", file=sys.stderr)
+    print(f"{args.folder}: {counted(len(rows), 'member')}: {told}", file=sys.stderr)
     if flowing := sum(not one.homogeneous for one in shares):
         print(
             f"warning: {flowing} of {len(shares)} cooling gases are not homogeneous at the end "

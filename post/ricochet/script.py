@@ -18,7 +18,7 @@ import matplotlib
 from tqdm import tqdm
 
 from .figures.drawing import STYLE, plt, save, warn
-from .reading.files import did_you_mean
+from .reading.files import counted, did_you_mean
 from .reading.nature import Refused, stays_in_box
 from .reading.reader import RunError, read_run
 from .reading.units import UNNAMED
@@ -85,7 +85,8 @@ def finished(paths: list[Path]) -> list[Path]:
             missing |= read_manifest(folder).keys() - there
     if missing:
         names = ", ".join([*sorted(missing, key=in_order)[:10], *["..."] * (len(missing) > 10)])
-        told = f"{len(whole)} of {len(whole) + len(missing)} runs; {len(missing)} unfinished"
+        of_all = counted(len(whole) + len(missing), "run")
+        told = f"{len(whole)} of {of_all}; {len(missing)} unfinished"
         print(f"warning: {told}: {names}", file=sys.stderr)
     return whole
 

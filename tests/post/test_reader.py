@@ -15,6 +15,7 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from ricochet import RunError, read_run
+from ricochet.reading.files import counted, did_you_mean
 from ricochet.figures.drawing import draw_box, plt, radius_marks
 from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 from whole_runs import FINISHED, MIXTURE, STOPPED
@@ -25,6 +26,14 @@ def tiny(path, frames=1, count=1, **more):
     """Write a run of disks at rest."""
     x = np.zeros((frames, count, 2))
     return write_run(path, x, x, **more)
+
+
+def test_a_part_of_a_name_suggests_the_shortest_name_that_contains_it():
+    names = ["species1/temperature", "all/temperature", "virial"]
+    assert did_you_mean("temp", names) == "; did you mean all/temperature?"
+    assert did_you_mean("virail", iter(names)) == "; did you mean virial?"
+    assert did_you_mean("xyz", names) == did_you_mean("a", names) == ""
+    assert [counted(k, "frame") for k in range(3)] == ["0 frames", "1 frame", "2 frames"]
 
 
 # --- what a run says ---

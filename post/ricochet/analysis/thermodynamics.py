@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..predictions import hard_disks
-from ..reading.files import RunError
+from ..reading.files import RunError, counted
 from ..reading.nature import Refused, allow
 from ..reading.reader import SIDES, Run, Species
 from .equilibrium import (
@@ -198,8 +198,8 @@ def steps(run: Run, skip: float | None = None) -> Steps:
     first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if len(time) - first <= FEWEST:
         raise RunError(
-            f"{run.path}: has {len(time) - first} samples of the observables in equilibrium, too "
-            "few for an error; set output.observables_every_time, or run longer"
+            f"{run.path}: has {counted(len(time) - first, 'sample')} of the observables in "
+            "equilibrium, too few for an error; set output.observables_every_time, or run longer"
         )
     sums = (
         run.observable(name).value[first:]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 import numpy as np
 
 from .arrays import Index, chosen
-from .files import RunError, destination, optional_package
+from .files import RunError, counted, destination, optional_package
 from .foreign import DAMAGE, check_counts, check_index, check_values
 from .nature import Refused
 from .reader import Run
@@ -241,7 +241,7 @@ def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
         with package.open(str(path), "r") as file, np.errstate(all="ignore"):
             count = len(file)
             if not -count <= frame < count:
-                raise RunError(f"{path}: has no frame {frame}; it has {count} frames")
+                raise RunError(f"{path}: has no frame {frame}; it has {counted(count, 'frame')}")
             check_counts(file.file, path, frame % count)
             return imported_gsd(where, file[frame])
     except FileNotFoundError:
@@ -432,7 +432,8 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
         with path.open("rb") as file, np.errstate(all="ignore"):
             starts = [*frame_starts(file)]
             if not -len(starts) <= frame < len(starts):
-                count = f"it has {len(starts)} frames" if starts else "it is no dump file of LAMMPS"
+                count = f"it has {counted(len(starts), 'frame')}"
+                count = count if starts else "it is no dump file of LAMMPS"
                 raise RunError(f"{path}: has no frame {frame}; {count}")
             file.seek(starts[frame])
             return imported(where, items_of(file))

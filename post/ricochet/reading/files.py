@@ -78,8 +78,19 @@ def hdf5_file(path: Path) -> h5py.File:
 
 
 def did_you_mean(word: str, others: Iterable[str]) -> str:
-    """Return a question that suggests the most similar word, or '' if there is none."""
-    return "".join(f"; did you mean {near}?" for near in get_close_matches(word, others, 1))
+    """Return a question that suggests the most similar word, or '' if there is none.
+
+    If no word is similar, the shortest one that contains `word` is suggested.
+    """
+    known = list(others)
+    longer = [other for other in known if len(word) > 2 and word.lower() in other.lower()]
+    near = get_close_matches(word, known, 1) or sorted(longer, key=len)[:1]
+    return "".join(f"; did you mean {name}?" for name in near)
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number and a noun, in the plural unless the number is 1."""
+    return f"{number} {noun}" + "s" * (number != 1)
 
 
 def tree(group: h5py.Group) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..reading.files import TemporaryFolder, destination
+from ..reading.files import TemporaryFolder, counted, destination
 
 SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as the program reads it
 
@@ -152,5 +152,5 @@ def sized(name: str, values: np.ndarray, count: int) -> np.ndarray:
     if values.ndim == 0:
         return np.full(count, values)
     if len(values) != count or count == 0:
-        raise ValueError(f"{name}: of {len(values)} disks, not of {max(count, 1)}")
+        raise ValueError(f"{name}: of {counted(len(values), 'disk')}, not of {max(count, 1)}")
     return values

@@ -18,7 +18,7 @@ from ...analysis.statistics import (
 )
 from ...figures.drawing import COLOURS, caption, plt
 from ...figures.sheet import Panel, Sheet, legend_above
-from ...reading.files import RunError
+from ...reading.files import RunError, counted
 from ...reading.nature import Refused
 from ...reading.reader import Run
 from ..groups import Group, grouped
@@ -58,7 +58,7 @@ def rate(run: Run, after: float):
     late = time[:-1] >= after
     if late.sum() < 2:
         count = int(np.sum(time >= after))
-        raise RunError(f"{run.path}: has {count} samples after t = {after:g}; needs 3")
+        raise RunError(f"{run.path}: has {counted(count, 'sample')} after t = {after:g}; needs 3")
     return correlated_mean(rates[late])
 
 

@@ -9,6 +9,7 @@ import scipy
 from ...analysis.thermodynamics import FLUID, virial_over_kt, z_virial
 from ...figures.drawing import COLOURS, caption, plt
 from ...figures.sheet import Panel, Sheet
+from ...reading.files import counted
 from ...reading.nature import allow
 from ...reading.reader import Run, RunError
 from ..groups import Group, by_packing
@@ -34,7 +35,7 @@ def draw_bars(axes: plt.Axes, group: Group, row: dict[str, Any]) -> None:
         axes.errorbar(k, mean, reach, marker="o", **style)
     axes.axhline(row["Z"], color="black", lw=1)
     axes.set_title(f"η = {group.key:g}: {row['within_%']:.0f} % of\n{len(group.runs)} contain it")
-    axes.set(xticks=[], xlabel=f"{len(first)} runs, in order")
+    axes.set(xticks=[], xlabel=f"{counted(len(first), 'run')}, in order")
     axes.set_ylabel("$Z = P\\,/\\,(n\\,kT)$ of a run")
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...figures.drawing import COLOURS, plt
 from ...figures.sheet import Panel, Sheet, legend_above
+from ...reading.files import counted
 from ...reading.reader import Run, RunError
 from ..groups import Group, each_run, grouped
 from ..options import recorded
@@ -21,7 +22,9 @@ def table(runs: list[Run]) -> list[dict[str, Any]]:
     rows = []
     for (disks, threads), times in walls.items():
         if (disks, 1) not in walls:
-            raise RunError(f"no run of {disks} disks has one thread, which the comparison requires")
+            raise RunError(
+                f"no run of {counted(disks, 'disk')} has one thread, which the comparison requires"
+            )
         alone = np.median(walls[disks, 1])
         row = {"disks": disks, "threads": threads, "runs": len(times)}
         row |= {"seconds": float(np.median(times)), "gain": float(alone / np.median(times))}
@@ -37,7 +40,7 @@ def draw_speedup(axes: plt.Axes, result: Result) -> None:
             np.array([row[name] for row in own])
             for name in ("threads", "gain", "gain_least", "gain_most")
         )
-        label = f"{disks} disks"
+        label = counted(disks, "disk")
         axes.errorbar(threads, y, (y - low, high - y), marker="o", color=colour, label=label)
     cores = (1, max(row["threads"] for row in rows))
     axes.plot(cores, cores, ls=":", lw=1, color="grey", label="threads")

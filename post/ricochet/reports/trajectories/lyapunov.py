@@ -8,6 +8,7 @@ import numpy as np
 from ...analysis.estimates import Estimate, jackknife
 from ...figures.drawing import COLOURS, plt
 from ...figures.sheet import Panel, Sheet, legend_above
+from ...reading.files import counted
 from ...reading.nature import TRAITS, allow
 from ...reading.reader import Run, RunError
 from ..groups import Group, each_run
@@ -118,7 +119,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     """Return the Lyapunov exponent from pairs of successive runs."""
     runs = groups[0].runs
     if len(runs) % 2:
-        raise RunError(f"{len(runs)} runs: an even number is required")
+        raise RunError(f"{counted(len(runs), 'run')}: an even number is required")
     apart = [distance(*pair) for pair in zip(runs[::2], runs[1::2], strict=True)]
     frames = min(map(len, apart))
     apart = np.array([track[:frames] for track in apart])
