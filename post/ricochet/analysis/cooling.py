@@ -141,7 +141,7 @@ def temperature_ratio(runs: Sequence[Run], first: float, last: float) -> Estimat
 
 
 def moving_energy(run: Run, name: str = "all") -> np.ndarray:
-    """Return the kinetic energy per disk at each sample (T,); at first it must not be zero."""
+    """Return the kinetic energy per disk (T,); raise Refused if its initial value is zero."""
     energy = run.observable(f"{name}/kinetic_energy").value
     if name == "all" and not energy[0] > 0:
         raise Refused(f"{run.path}: starts with disks at rest, which cannot cool")
@@ -168,8 +168,8 @@ def flow_share(runs: Sequence[Run], frame: int = -1) -> FlowShare:
 
     When a gas becomes inhomogeneous, neighbouring disks begin to move in parallel. For independent
     velocities, the squared momentum of a cell of about 25 disks (`TOGETHER`) is on average the sum
-    of the squared momenta of its disks. The excess, divided by twice the mass of the cell, is the
-    energy of a flow.
+    of the squared momenta of its disks. Any excess over this sum is due to a flow: divided by twice
+    the mass of the cell, it is the energy of the flow.
 
     Parameters
     ----------
@@ -181,8 +181,8 @@ def flow_share(runs: Sequence[Run], frame: int = -1) -> FlowShare:
     Returns
     -------
     FlowShare
-        fraction in all runs together, and the p-value of independent velocities; the fraction is
-        NaN if the frames have no velocities
+        fraction for all runs together (NaN if the frames have no velocities), and the p-value of
+        the hypothesis that velocities are independent
 
     Examples
     --------
@@ -199,7 +199,7 @@ def flow_share(runs: Sequence[Run], frame: int = -1) -> FlowShare:
 
 
 def cell_sums(run: Run, frame: int) -> tuple[float, float, float, float]:
-    """Return flow energy, kinetic energy, and chi^2 of the momenta of cells with its freedom."""
+    """Return flow energy, kinetic energy, chi^2 of the momenta of cells and degrees of freedom."""
     momentum = run.mass[:, None] * (run.velocity[frame] - drift(run))
     side = np.sqrt(run.edges.prod() * TOGETHER / run.n_disks)
     cells = np.maximum(2, np.rint(run.edges / side)).astype(int)
@@ -214,7 +214,7 @@ def cell_sums(run: Run, frame: int) -> tuple[float, float, float, float]:
 
 
 def flow_notes(groups: Sequence[tuple[str, Sequence[Run]]]) -> list[str]:
-    """Return a note for each named group of gases that are inhomogeneous at the end."""
+    """Return a note for each named group of gases that become inhomogeneous during their runs."""
     notes = []
     for name, runs in groups:
         found = flow_share(cooled) if (cooled := [r for r in runs if r.nature.cooling]) else None
@@ -233,8 +233,8 @@ def flow_notes(groups: Sequence[tuple[str, Sequence[Run]]]) -> list[str]:
 def first_rate(run: Run) -> float:
     """Return the initial collision rate w0 [1/time] of smooth disks cooling in a periodic box.
 
-    w0 is predicted by the equation of state for equal disks, and counted for mixtures. Refused is
-    raised if Haff's law does not apply.
+    For equal disks w0 is predicted by the equation of state; for mixtures it is measured. Refused
+    is raised if Haff's law does not apply.
     """
     law = "Haff's law is for smooth disks that only cool, in a periodic box"
     allow(run, law, *SMOOTH)
@@ -250,7 +250,7 @@ def first_rate(run: Run) -> float:
 
 
 def counted_rate(run: Run) -> float:
-    """Return w0 from the collisions counted at first, corrected for the cooling meanwhile."""
+    """Return w0 from the first collisions, corrected for the cooling while they are counted."""
     time, tau = run.collisions_per_disk
     first = min(int(np.searchsorted(tau, 1.0)), len(tau) - 1)
     slower = (1 - run.restitution**2) * tau[first] / 4
@@ -283,10 +283,11 @@ def haff(
 ) -> tuple[Curves, Estimate, float, Estimate]:
     """Compare the cooling of runs with the same coefficient of restitution with Haff's law.
 
-    `tracks` are results of `energy_left`, and `soft` is that of `soft_law`. The function returns
-    the curves (points,) of the energy, its predictions and the cooling rate; the cooling rate per
-    collision or, with `soft`, the exponent of the decay in time; and the collisions per disk at
-    which the gas becomes inhomogeneous (NaN if never), without and with its error.
+    `tracks` are results of `energy_left`, and `soft` is a result of `soft_law`. The function
+    returns four objects. The first holds curves (points,): the energy, its predictions and the
+    cooling rate. The second is the mean cooling rate per collision or, with `soft`, the exponent of
+    the decay in time. The third is the number of collisions per disk at which the gas becomes
+    inhomogeneous (NaN if it never does), and the fourth is the same number with its error.
     """
     time = np.geomspace(max(t[1] for t, *_ in tracks), min(t[-1] for t, *_ in tracks), points)
     tau, by_tau = on_grid([c for _, c, _ in tracks], [(k, np.log(k)) for *_, k in tracks], points)
@@ -326,13 +327,16 @@ def haff(
 
 
 def exponent(time: np.ndarray, energy: np.ndarray) -> float:
-    """Fit p of K ~ t^-p in the last decade of times (T,): 2 by Haff's law, 5/3 if viscoelastic."""
+    """Fit the exponent p of K ~ t^-p to the last decade of times (T,).
+
+    Haff's law predicts p = 2, and the theory of viscoelastic disks p = 5/3.
+    """
     late = time >= time[-1] / 10
     return float(-np.polyfit(np.log(time[late]), np.log(energy[late]), 1)[0])
 
 
 def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray) -> float:
-    """Return tau after which the cooling rate stays below `SLOW` times the `law`, or NaN."""
+    """Return the tau after which the cooling rate stays below `SLOW` times `law` (NaN if none)."""
     slow = rate < SLOW * law
     if not slow[-1]:
         return float("nan")

@@ -50,18 +50,19 @@ REACH = 0.3  # mean diameters
 CLOSE = 1e-9  # relative difference below which two lags are equal
 MOST_PAIRS = 2 * 10**6  # largest number of pairs of samples whose lags are compared
 PATIENCE = 5.0  # time after which a terminal shows the progress [s]
-# largest sum of disks over all pairs of samples for which every sample is an origin
+# Every sample is a time origin unless samples x lags x disks exceeds this number.
 MOST_DISKS = 10**8
 FLOWING = {"sheared", "sliding_surfaces", "recycled", "changed"}
 FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
 
 
 def lags_of(times: np.ndarray) -> np.ndarray:
-    """Return 0 and twelve lags per decade, each with many pairs of the given samples, as lags (L,).
+    """Return lags (L,): 0 and twelve per decade, each with many pairs of the given samples.
 
-    The lag with the most pairs represents its interval, unless it has less than an eighth of the
-    pairs of a shorter lag, when both are corrected for the remaining duration. ValueError is raised
-    unless there are at least two `times` (T,) in increasing order.
+    In each twelfth of a decade the lag with the most pairs is chosen. It is omitted if a shorter
+    lag has more than eight times as many pairs; for this comparison, the numbers of pairs are
+    divided by the time that remains after a lag. ValueError is raised unless there are at least two
+    `times` (T,) in increasing order.
     """
     if len(times) < 2 or not (np.diff(times) > 0).all():
         raise ValueError("lags require at least two times in increasing order")
@@ -75,7 +76,7 @@ def lags_of(times: np.ndarray) -> np.ndarray:
     order = np.lexsort((first, -pairs, part))
     _, best = np.unique(part[order], return_index=True)
     lags, pairs = apart[first[order[best]]], pairs[order[best]]
-    # relative to the remaining duration at the shortest lag
+    # time that remains after each lag, relative to the time that remains after the shortest lag
     rest = 1 + (apart.min() - lags) / (times[-1] - times[0])
     enough = pairs / rest >= FEW_PAIRS * np.maximum.accumulate(pairs / rest)
     return np.append(0, lags[enough])
@@ -135,7 +136,7 @@ class Correlator:
         reach: float | None = None,
         lags: np.ndarray | None = None,
     ):
-        """Start with empty sums, for the given lags or those that `lags_of` selects."""
+        """Start with empty sums for the given lags, or for the lags that `lags_of` selects."""
         cools = {"inelastic"} if source.nature.cooling else set()
         what = "time correlations require a steady state without flow"
         allow(source, what, *TRAITS.keys() - FLOWING - cools)
@@ -155,14 +156,14 @@ class Correlator:
         self.sums = np.zeros((*size, len(self.names), len(FIXED) + len(self.waves)))
         self.done = 0  # number of samples added
         self.held: dict[int, np.ndarray] = {}  # samples kept, by number: x, y, vx, vy (4, N)
-        # origins whose last partner is a sample, by its number
+        # for the number of each sample: the origins that need no later sample
         self.ends: dict[int, list[int]] = {}
-        # pairs (origin, lag) that a sample completes, by its number
+        # for the number of each sample: the pairs (origin, lag) that this sample completes
         self.due: dict[int, list[tuple[int, int]]] = {}
         self.last = np.full(len(self.lags), -1.0)  # time interval of the last origin of each lag
 
     def follow(self, source: Run | Simulation) -> Self:
-        """Add the new samples of a run, which may have grown, or advance a simulation for them."""
+        """Add new samples: those stored by a run since the last call, or of a simulation."""
         times = self.times[self.done :]
         look = {"delay": PATIENCE, "disable": None, "leave": False, "unit": "frame"}
         for place, velocity in tqdm(samples(source, times), total=len(times), **look):
@@ -196,7 +197,7 @@ class Correlator:
         self.done += 1
 
     def count(self, origins: np.ndarray, lags: np.ndarray, state: np.ndarray) -> None:
-        """Add P pairs of earlier samples and the present one, at lags with the indices `lags`."""
+        """Add P pairs of the present sample and earlier ones, at lags with the indices `lags`."""
         values = np.empty((len(FIXED) + len(self.waves), len(origins), state.shape[1]))
         for k, origin in enumerate(origins):
             self.evaluate(self.held[origin], state, values[:, k])
@@ -237,7 +238,7 @@ class Correlator:
 
 
 def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield unwrapped positions and velocities at given times; a simulation is advanced."""
+    """Yield unwrapped positions and velocities at given times, advancing a simulation."""
     if isinstance(source, Simulation):
         box = source.parameters["box"]
         edges = np.subtract(box["upper"], box["lower"])

@@ -37,7 +37,7 @@ class Crater(NamedTuple):
     side_collisions: int
 
 
-# Traits of `nature` that are allowed because they do not set the bed in motion.
+# Properties of a run (`Run.nature`) that are allowed because they do not set the bed in motion.
 QUIET: tuple[str, ...]
 QUIET = (
     "inelastic",
@@ -52,7 +52,7 @@ QUIET = (
 QUIET += ("time_stepped",)
 FEW_HITS = 0.01  # wall collisions per disk up to which the box does not affect the crater
 HIT_OVER_LEAST = 3.4  # number of disks hit, divided by M (1/f - 1) / (1 - xi^2)
-# disks in a sufficiently large bed, divided by the number of disks hit
+# number of disks in a sufficiently large bed, divided by the number of disks hit
 BED_OVER_HIT = 2.2
 
 
@@ -67,17 +67,18 @@ def ended_by_time(run: Run, size: Crater) -> bool:
 
 
 def box_takes_part(run: Run, side_collisions: float) -> bool:
-    """Return whether the sides, with more than 0.01 collisions per disk, affect the crater."""
+    """Return whether the sides affect the crater: with more than 0.01 side collisions per disk."""
     return side_collisions > FEW_HITS * run.n_disks
 
 
 def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> float:
     """Estimate the number of disks in a bed whose crater does not reach the sides of the box.
 
-    In a large bed about 3.4 M (1/f - 1) / (1 - xi^2) disks are hit, and a bed of 2.2 times as many
-    disks suffices. Both factors were measured in a square box, half filled at a packing fraction of
-    0.5, for M from 10 to 50, xi from 0.3 to 0.8, ratios of radii from 2 to 10 and f = 0.1. The
-    result is infinite for xi = 1 or f = 0.
+    M is the mass ratio of projectile and bed disk, xi the restitution, and f the fraction of the
+    energy at which the run ends. In a large bed, about 3.4 M (1/f - 1) / (1 - xi^2) disks are hit.
+    A bed with 2.2 times this number of disks is large enough. Both factors were measured in a
+    square box, half filled at a packing fraction of 0.5, for M from 10 to 50, xi from 0.3 to 0.8,
+    ratios of radii from 2 to 10 and f = 0.1. The result is infinite for xi = 1 or f = 0.
     """
     if restitution >= 1 or fraction <= 0:
         return float("inf")

@@ -16,7 +16,7 @@ Curves = dict[str, TimeSeries]  # by species; "" stands for all disks
 
 
 def temperature(run: Run) -> Curves:
-    """Return the temperature as a function of time, relative to the mean velocity."""
+    """Return the temperature of the motion relative to the mean velocity as a function of time."""
     if run.n_disks < 2:
         raise Refused(
             f"{run.path}: holds one disk; a temperature requires at least two, as it is "
@@ -32,7 +32,7 @@ def temperature(run: Run) -> Curves:
 
 
 def components(run: Run) -> Curves:
-    """Return kT_x and kT_y of all disks as functions of time, relative to their mean velocity."""
+    """Return kT_x and kT_y of the motion relative to the mean velocity as functions of time."""
     time, tensor = run.observable("kinetic_tensor")
     motion = 0 if run.shear_rate else run.observable("momentum").value ** 2 / run.mass.sum()
     kt = (tensor[:, [0, 3]] - motion) / (run.n_disks - 1)
@@ -67,9 +67,9 @@ def temperature_law(run: Run) -> np.ndarray | float | None:
 
 
 def only_moving(run: Run, motion: str) -> int | None:
-    """Return the index of the only moving side, or None.
+    """Return the index of the only moving side if it moves as `motion` says, or None.
 
-    None is also returned if its motion is not `motion`, or if the disks are not equal and elastic.
+    None is also returned if the disks are not equal and elastic.
     """
     moves = [k for k, side in enumerate(run.sides) if side.get("motion", "still") != "still"]
     plain = run.nature <= {"moving_sides", "piston", "walls", "rotating"} and len(moves) == 1

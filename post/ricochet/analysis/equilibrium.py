@@ -55,8 +55,8 @@ def all_settle(runs: Sequence[Run]) -> bool:
 def after_start(run: Run, skip: float | None = None) -> float:
     """Return the time at which `skip` collisions per disk have occurred.
 
-    By default these are 15 (`SPEEDS_FORGET`), but at most half of those in the run. In a run
-    without collisions, the default is half of its duration.
+    The default of `skip` is 15 (`SPEEDS_FORGET`), or half of the collisions per disk in a short
+    run. For a run without collisions, half of its duration is returned.
     """
     time = np.union1d(run.time, run.collisions_per_disk.time)
     tau = run.collisions_per_disk_at(time)
@@ -73,8 +73,8 @@ def after_start(run: Run, skip: float | None = None) -> float:
 def start_of_steady_state(run: Run, skip: float | None = None) -> float:
     """Return the time after which the collision rate and the energies of the species do not drift.
 
-    Unless `skip` is given, at least 15 collisions per disk (`SPEEDS_FORGET`), during which the
-    speeds relax, are discarded, but never more than half of the run for this reason alone. Drifts
+    Unless `skip` is given, at least 15 collisions per disk (`SPEEDS_FORGET`) are discarded, because
+    speeds relax during this time. Of a run with fewer than 30, this rule discards one half. Drifts
     are sought in the observables or, if these have few samples, in the frames.
 
     Parameters
@@ -120,9 +120,10 @@ def explained_start(run: Run, skip: float | None = None) -> tuple[float, str]:
 def relaxed_start(run: Run, skip: float | None = None) -> tuple[float, str]:
     """Return the time after which a gas has relaxed, with the reason for this choice.
 
-    Only 15 collisions per disk (`SPEEDS_FORGET`) are discarded, unless an observable before the end
-    of its apparent drift differs significantly from its later values. `explained_start` is
-    stricter: owing to noise, it discards on average a tenth of a run that is steady throughout.
+    If no observable drifts significantly, only 15 collisions per disk (`SPEEDS_FORGET`) are
+    discarded. A drift is significant if the mean before its end differs from the mean after it.
+    `explained_start` is stricter: owing to noise, it discards on average a tenth of a run that is
+    steady throughout.
     """
     start, reason = explained_start(run, skip)
     time, series = examined(run)
@@ -139,9 +140,9 @@ def relaxed_start(run: Run, skip: float | None = None) -> tuple[float, str]:
 
 
 def has_changed(values: np.ndarray, first: int, end: int) -> bool:
-    """Return whether the mean of values[first:end] differs from that of the rest, or may do so.
+    """Return whether the means of values[first:end] and values[end:] differ significantly.
 
-    The two means also count as different if the rest has too few independent samples for a test.
+    The means also count as different if values[end:] has too few independent samples for a test.
     """
     before, after = values[first:end], values[end:]
     if len(before) == 0:
@@ -245,7 +246,7 @@ def frames_from(
 
 
 def later(run: Run, skip: float | None = None) -> slice:
-    """Return the frames in the steady state except the last, which may end a shorter interval."""
+    """Return the frames in the steady state except the last, which may follow after less time."""
     first = int(np.searchsorted(run.time, start_of_steady_state(run, skip)))
     if run.n_frames - 1 - first < 2:
         raise RunError(f"{run.path}: needs more frames after the start")
@@ -256,7 +257,7 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 
 def motion_notes(runs: Sequence[Run]) -> list[str]:
-    """Return a note for figures if noise accelerates the centre of mass, the frame of reference."""
+    """Return a note for figures if noise accelerates the centre of mass."""
     walks = any("random_walk" in run.nature for run in runs)
     note = "noise moves the centre of mass (drive.keep_momentum): motion is measured relative to it"
     return [note] * walks
@@ -280,7 +281,7 @@ def unforced(source: Run | Simulation) -> np.ndarray:
 
 
 def conserved_momentum(source: Run | Simulation) -> np.ndarray:
-    """Return a mask (2,) of the axes along which no wall changes the momentum (noise may)."""
+    """Return a mask (2,) of axes along which walls do not change the momentum; noise may do so."""
     walls = "walls" in source.nature and source.nature & ALONG_WALLS
     return unforced(source) & (not walls)
 

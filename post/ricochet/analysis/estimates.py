@@ -118,7 +118,10 @@ def goodness_of_fit(
 
 
 def student(samples: ArrayLike) -> Any:
-    """Return Student's t of 68 % intervals for numbers of independent samples (...); 1 for many."""
+    """Return Student's t of 68 % intervals, given numbers of independent samples (...).
+
+    For many samples t is 1.
+    """
     return scipy.special.stdtrit(np.clip(np.subtract(samples, 1.0), 1.0, MANY), ONE_SIGMA)
 
 
@@ -154,8 +157,8 @@ def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estim
     """Propagate the error of a curve (P,) to a number `of(curve)`, such as the time of a crossing.
 
     The number is calculated for the curve plus and for the curve minus its error, and half of the
-    difference is its error. Mean and error are NaN if one of these numbers is, or if the curve has
-    no error.
+    difference is its error. Mean and error are NaN if the curve has no error, or if the number is
+    NaN for one of these curves.
     """
     first, last = (of(curve.mean + sign * curve.error) for sign in (-1, 1))
     error = abs(last - first) / 2
@@ -184,7 +187,7 @@ class PseudoValues(NamedTuple):
         return np.where(seen.sum(axis=0) > 1, mean, np.nan)
 
     def rests(self) -> np.ndarray:
-        """Return deviations (G, ...) from the mean, whose squares add up to its squared error."""
+        """Return deviations (G, ...) from the mean; their squares add up to its squared error."""
         seen = self.share > 0
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))
@@ -217,8 +220,8 @@ def jackknife_of_sums(
 def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None) -> Estimate:
     """Estimate the probability density (B,) of a sample (n,) in bins with the edges (B + 1,).
 
-    The integral over all bins is the fraction of the sample inside them. Errors are those of
-    `independent` values [n].
+    The integral over all bins is the fraction of the sample inside them. The errors assume that
+    `independent` of the values are independent [n].
     """
     share = np.histogram(values, bins)[0] / len(values)
     error = np.sqrt(share * (1 - share) / (independent or len(values)))
@@ -277,8 +280,8 @@ def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
 def kurtosis_noise(count: int) -> float:
     """Return the standard deviation of a2 (see `excess_kurtosis`) for Maxwellian speeds.
 
-    x = v^2 is distributed exponentially; let its mean be 1. To first order a2 is the sample mean of
-    x^2 / 2 - 2 x minus its expectation, and one term has the variance 20 / 4 + 4 * 1 - 2 * 4 = 1.
+    x = v^2 is distributed exponentially; let its mean be 1. To first order, a2 is the sample mean
+    of y = x^2 / 2 - 2 x minus its expectation, and y has the variance 20 / 4 + 4 * 1 - 2 * 4 = 1.
     """
     return 1 / np.sqrt(count)
 
@@ -416,8 +419,8 @@ def with_errors(
 def points_miss_a_law(chi2: float, free: int, runs: float) -> bool:
     """Return whether chi^2 per degree of freedom is too large for chance (probability below 0.5 %).
 
-    `chi2` is based on errors that include Student's factor, each estimated from `runs` runs (Welch,
-    Biometrika 38, 330 (1951)); `free` is the number of degrees of freedom.
+    The errors in `chi2` are estimated from `runs` runs each and include Student's factor (Welch,
+    Biometrika 38, 330 (1951)). `free` is the number of degrees of freedom.
     """
     if free < 1 or runs < FEWEST_RUNS:
         return False

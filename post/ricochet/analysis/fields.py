@@ -30,14 +30,14 @@ __all__ = [
 
 MOST_BLOCKS = 16  # largest number of blocks per run
 FEWEST_BLOCKS = 3  # fewest blocks, in all runs together, from which an error is estimated
-# A cell must contain this many disks, with any one block left out, for kT, stress and heat flux.
+# kT, stress and heat flux of a cell require this many disks, even if any one block is left out.
 FEWEST_DISKS = 3
 OSCILLATION = 0.05  # fraction of kT due to the centre of mass above which this is no thermal motion
 FLOW_LEAST = -0.5  # lower bound of the correlation of the flow in neighbouring blocks
 LONG = 1.5  # length of a block over the statistical inefficiency
 POINTS = 1 << 16  # test points for the area that obstacles leave accessible
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides perpendicular to each axis
-#: Traits of `nature` with which Enskog's theory applies between two walls.
+#: Properties of a run (`Run.nature`) with which Enskog's theory applies between two walls.
 LAWFUL = {"walls", "thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 Cells = tuple[int, int]
 
@@ -69,7 +69,7 @@ class Block(NamedTuple):
 def steady_frames(run: Run, skip: float | None) -> list[int]:
     """Return the frames after `skip` collisions per disk, or the second half of the run."""
     moves_away = any(one.get("motion") in {"piston", "constant_velocity"} for one in run.sides)
-    # a side that starts to move during the run requires the second half
+    # If a side starts to move during the run, only the second half is steady.
     if moves_away or run.piston_positions:
         why = "has a side that moves away from its position (motion); fields require fixed cells"
         raise Refused(f"{run.path}: {why}")
@@ -82,7 +82,7 @@ def steady_frames(run: Run, skip: float | None) -> list[int]:
 
 
 def own_motion(run: Run, frames: list[int]) -> np.ndarray:
-    """Return velocities (F, N, 2) without shear flow and the noise-driven centre of mass."""
+    """Return velocities (F, N, 2) relative to the shear flow and a noise-driven centre of mass."""
     v = run.velocity[frames]
     if run.shear_rate:
         height = run.position[frames][..., 1] - run.lower[1]
@@ -95,8 +95,8 @@ def own_motion(run: Run, frames: list[int]) -> np.ndarray:
 def oscillation_notes(runs: list[Run], skip: float | None, species: str | None) -> list[str]:
     """Return a note for each run in which an oscillating flow raises the measured temperature.
 
-    The centre of mass of N independent disks has 1/N of their kinetic energy; any more is due to a
-    flow.
+    The centre of mass of N independent disks has 1/N of their kinetic energy; a larger fraction
+    indicates a flow.
     """
     notes = []
     for run in runs:
@@ -247,7 +247,7 @@ def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
 
 
 def sums(block: Block, cells: Cells, areas: list[np.ndarray], own: np.ndarray) -> np.ndarray:
-    """Return 12 sums for each cell (12, C) over the frames of a block and the disks `own` (N,).
+    """Return 12 sums for each cell (12, C), over the frames of a block and the disks `own` (N,).
 
     They are the number of frames, the number of disks, disks per area, and the sums of m, m v, m v
     v (xx, xy, yy), m v^2 v / 2 and I omega^2, with v from `own_motion`.
@@ -274,7 +274,7 @@ NAMES = (
     *("stress_xx", "stress_xy", "stress_yy", "heat_x", "heat_y"),
 )
 #: Lower bounds of the correlation of neighbouring blocks. The flow is the time derivative of a
-#: bounded displacement, which makes neighbouring blocks anticorrelated.
+#: bounded displacement, so that neighbouring blocks are anticorrelated.
 LEAST = np.array([FLOW_LEAST if name.startswith("flow") else 0.0 for name in NAMES])
 BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in NAMES])
 
@@ -283,8 +283,8 @@ def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
     """Return the fields (12, C) calculated from `sums`; NaN in cells without disks.
 
     kT, stress and heat flux are NaN in cells with fewer than `FEWEST_DISKS` disks. A flow with the
-    gradient g varies by g h across a cell of width h, which adds m (g h)^2 / 12 per disk to the sum
-    of m v v. This contribution is subtracted.
+    gradient g varies by g h across a cell of width h. This variation adds m (g h)^2 / 12 per disk
+    to the sum of m v v. This contribution is subtracted.
     """
     frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
     u, v, density = mx / mass, my / mass, dense / frames
@@ -409,7 +409,7 @@ def fluxes(blocks: list[Block], axis: int) -> PseudoValues:
 def expected(
     run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[float, float]
 ) -> np.ndarray:
-    """Predict flow velocity, kT and density at x, given the first two at mid-channel; shape (P, 3).
+    """Predict flow velocity, kT and density at x (P, 3) from flow velocity and kT at mid-channel.
 
     At uniform pressure, the equations du/dx = -shear / viscosity and dT/dx = -(energy - shear u) /
     conductivity are integrated with the given fluxes. ValueError is raised if the temperature

@@ -1,10 +1,10 @@
 """Tests of the speed distribution.
 
 The speeds in each frame are scaled by the energy of the frame and, where momentum is conserved,
-measured relative to the centre of mass. Random frames, in which the same number of disks is
-distributed uniformly on the energy sphere and scaled in the same way, yield the p-values. A
-statistical inefficiency accounts for correlations between frames. See "p-values of speeds" in
-docs/explanation/statistics.md.
+measured relative to the centre of mass. The p-values are obtained from random frames: velocities of
+the same number of disks, distributed uniformly on the sphere of constant energy and scaled in the
+same way. A statistical inefficiency accounts for correlations between frames. See "p-values of
+speeds" in docs/explanation/statistics.md.
 """
 
 from collections.abc import Sequence
@@ -23,8 +23,8 @@ __all__ = ["SpeedTest", "speed_test"]
 
 BINS = 30  # of equal probability
 DRAWN = 4000  # number of random samples
-# Number of speeds in a random sample; in larger samples the scaled statistics are distributed
-# alike.
+# Number of speeds in a random sample; the scaled statistics of larger samples have the same
+# distribution.
 MOST = 1000
 MANY = 2000  # disks above which the motion of the centre of mass is negligible
 NOISES = 400  # random estimates of a statistical inefficiency
@@ -45,9 +45,9 @@ class SpeedTest(NamedTuple):
 
 
 def shares(run: Run, frames: Index, name: str) -> np.ndarray:
-    """Return the energies of the disks of a species over the mean energy of their frame, (F, n).
+    """Return the energies (F, n) of the disks of a species, relative to the mean energy in a frame.
 
-    The mean is that of all disks if the run is in equilibrium, otherwise that of the species.
+    The mean is taken over all disks if the run is in equilibrium, otherwise over the species.
     """
     energy, own = thermal_energy(run, frames), run.of_species(name)
     unit = energy if run.nature.in_equilibrium else energy[:, own]
@@ -149,10 +149,11 @@ def inefficiency(counts: Sequence[np.ndarray], cumulative: bool) -> float:
 
 @lru_cache(maxsize=64)
 def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
-    """Return random estimates (NOISES,) of a statistical inefficiency over its true value.
+    """Return random estimates (NOISES,) of a statistical inefficiency, divided by its true value.
 
-    Each is obtained from random numbers of disks in bins whose autocorrelation decays
-    exponentially, for runs of `sizes` frames. With 20 frames the relative noise is about one third.
+    Each estimate is based on runs of `sizes` frames with random numbers of disks in bins. The
+    autocorrelation of these numbers decays exponentially. With 20 frames the relative noise is
+    about one third.
     """
     if sum(sizes) > LONG:
         return np.ones(NOISES)
@@ -204,8 +205,9 @@ def speed_test(runs: Sequence[Run], frames: Sequence[Index], name: str) -> Speed
     -------
     SpeedTest
         statistics and p-values of the Kolmogorov-Smirnov and chi-square tests. If the distribution
-        is unknown, they are NaN and `law` is "none": for disks that conserve their angular momentum
-        in a round container, and for fewer than three disks sharing a fixed energy
+        is unknown, they are NaN and `law` is "none". It is unknown for disks that conserve their
+        angular momentum in a round container, and for fewer than three disks that share a fixed
+        energy
 
     Examples
     --------

@@ -24,8 +24,8 @@ def kt_of_frames(
     """Return kT (F,) in frames, relative to the shear flow and to the centre of mass.
 
     The motion of the centre of mass is subtracted along axes where momentum is conserved. `species`
-    selects disks. The result is the mean of kT_x and kT_y, or only one of them if `component` is 0
-    or 1.
+    selects disks. The result is the mean of kT_x and kT_y, kT_x if `component` is 0, or kT_y if it
+    is 1.
     """
     own = slice(None) if species is None else run.of_species(species)
     energy = thermal_energy(run, frames, component)[:, own].mean(axis=1)
@@ -82,9 +82,9 @@ def reduced_speeds(
 def moment(members: Sequence[np.ndarray], power: int, independent: float) -> Estimate:
     """Return the mean of u^power, where the speeds u are first scaled to a mean square of 1.
 
-    `members` holds, for each run, the speeds (F, n) of n disks in F frames. The error is that of
-    the time series of frames, corrected for the scaling; if a single run has too few frames, it is
-    that of `independent` uncorrelated speeds.
+    `members` holds, for each run, the speeds (F, n) of n disks in F frames. The error is estimated
+    from the time series of frames and corrected for the scaling. If a single run has too few
+    frames, the error is calculated for `independent` uncorrelated speeds instead.
     """
     u = np.concatenate([one.ravel() for one in members])
     mean = np.mean(u**power)
@@ -106,8 +106,8 @@ def relaxation(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return collisions per disk (F,) and the second Sonine coefficient a2 (F,) of early frames.
 
-    Only frames in which disks of all species move are used, up to `until` collisions per disk or,
-    if given, the first `frames` of them.
+    Frames in which a whole species is at rest are left out. Of the others, the first `frames` are
+    used or, if `frames` is not given, all up to `until` collisions per disk.
     """
     tau = run.collisions_per_disk_at(run.time)
     if frames is None:

@@ -51,7 +51,8 @@ MOST_WINDOWS = 10**6
 FEW = 10  # independent samples
 FINE, COARSE = 64, 16  # parts into which a series is divided to resolve its slow modes
 FEWEST = 8  # fewest independent samples from which an error is estimated
-# The error of a series is estimated from at least and at most this many slow waves.
+# Smallest and largest number of slow Fourier components from which the error of a series is
+# estimated.
 LEAST_WAVES, MOST_WAVES = 2, 8
 PER_WAVE = 6  # upper bound of the number of waves times inefficiency over length
 LEAST_INEFFICIENCY = 0.02  # lower bound, for a strongly anticorrelated series
@@ -72,7 +73,7 @@ class SeriesMean(NamedTuple):
 
 
 def cells(series: np.ndarray, count: int) -> np.ndarray:
-    """Return the means of about `count` equal parts of a series (T,), less an excess in front."""
+    """Return the means of about `count` equal parts of a series (T,), omitting first samples."""
     width = max(1, len(series) // count)
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
 
@@ -81,8 +82,8 @@ def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     """Estimate the statistical inefficiency 1 + 2 tau of a series.
 
     Correlations increase the variance of the mean by this factor; tau is the integrated
-    autocorrelation time in samples. The sum is truncated, and corrected for the unknown mean, as in
-    Wolff, Computer Physics Communications 156, 143 (2004), with S = 1.5.
+    autocorrelation time in samples. The sum of autocorrelations is truncated, and corrected for the
+    unknown mean, as in Wolff, Computer Physics Communications 156, 143 (2004), with S = 1.5.
 
     Parameters
     ----------
@@ -169,11 +170,11 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     """Return standard error of the mean, degrees of freedom and drift of a series (T,).
 
     The squared error is the mean square of the lowest coefficients of a cosine transform (Lazarus
-    et al., Journal of Business and Economic Statistics 36, 541 (2018)), those with periods longer
-    than the correlation length: the inefficiency plus its standard deviation (Madras and Sokal,
-    Journal of Statistical Physics 50, 109 (1988)). The drift is the first coefficient over the root
-    mean square of the others. This ratio follows Student's distribution and is converted to a
-    standard Gaussian variable.
+    et al., Journal of Business and Economic Statistics 36, 541 (2018)). Coefficients are included
+    if their periods are longer than the inefficiency plus its standard deviation (Madras and Sokal,
+    Journal of Statistical Physics 50, 109 (1988)). The drift is the first coefficient, divided by
+    the root mean square of the other ones. This ratio follows Student's distribution and is
+    converted to a standard Gaussian variable.
     """
     parts = cells(series, FINE)
     per_sample, lag = inefficiency_and_lag(parts, LEAST_INEFFICIENCY)
@@ -194,12 +195,12 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
     """Return standard error of the mean and degrees of freedom of an anticorrelated series (T,).
 
-    The running sum of such a series is bounded: an example is the momentum of a gas, to which two
-    walls add impulses. Its two ends contribute equally to the variance of the mean and to the power
-    of a Fourier transform, but twice as much to the power of a cosine transform, which would
-    therefore overestimate the variance. The power rises as the square of the frequency. The smaller
-    the inefficiency `per_sample`, the fewer coefficients are used, so that the relative bias stays
-    the same.
+    The running sum of such a series is bounded. An example is the momentum of a gas, the sum of the
+    impulses of two walls. Only the two ends of the running sum contribute to the variance of the
+    mean. They contribute the same amount to the power of a Fourier transform, but twice as much to
+    the power of a cosine transform. A cosine transform would therefore overestimate the variance.
+    The power rises as the square of the frequency. Fewer coefficients are used if the inefficiency
+    `per_sample` is smaller, so that the relative bias stays the same.
     """
     most = min(MOST_WAVES, len(parts) // 2) // 2
     pairs = int(np.clip(round(len(parts) * per_sample**0.5 / (2 * PER_WAVE)), 1, max(1, most)))
@@ -250,8 +251,8 @@ def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     Returns
     -------
     SeriesMean
-        the average; `samples` is the sum over the runs or, for an error from the scatter, the
-        number of runs
+        the average; `samples` is the sum of the samples of all runs or, if the error is estimated
+        from the scatter, the number of runs
 
     Examples
     --------

@@ -4,10 +4,10 @@ In a steady state the flux j of disks (disks per length and time) has no diverge
 psi / dy and j_y = -d psi / dx. Contour lines of psi are streamlines, and the difference of psi
 between two points is the number of disks that pass between them per unit of time.
 
-psi minimises the integral over the box of the squared difference between the measured flux and that
-of psi. This integral depends on the disks only through sums of their velocities times the gradients
-of basis functions, so that the flux need not be averaged over cells, and psi does not depend on the
-requested cells as long as the finite elements are small.
+psi minimises the integral, over the box, of the squared difference between the measured flux and
+the flux given by the derivatives of psi. In this integral the disks occur only in sums of their
+velocities times the gradients of basis functions. The flux is therefore not averaged over cells,
+and psi does not depend on the requested cells as long as the finite elements are small.
 """
 
 from typing import NamedTuple
@@ -188,10 +188,10 @@ def node_unknowns(
 ) -> tuple[int, scipy.sparse.csr_array]:
     """Return the number of unknowns, and the matrix that maps them to psi at the nodes.
 
-    The unknowns are psi at the nodes not on walls, shared by periodic images, and one flux for each
-    periodic axis: up to its sign, the difference of psi between the two sides parallel to this
-    axis. On walls psi is constant; it is 0 on the lower and the left wall, or in the lower left
-    corner.
+    The unknowns are psi at the nodes not on walls, where periodic images share one unknown, and one
+    flux for each periodic axis. Up to its sign, this flux is the difference of psi between the two
+    sides parallel to the axis. On each wall psi is constant. It is 0 on the lower and the left wall
+    or, without these walls, in the lower left corner.
     """
     y, x = np.meshgrid(np.arange(rows + 1), np.arange(columns + 1), indexing="ij")
     fixed = (x % columns == 0) & (y % rows == 0) if np.all(periodic) else np.zeros(x.shape, bool)

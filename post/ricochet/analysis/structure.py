@@ -37,7 +37,7 @@ def periods(run: Run) -> np.ndarray:
 
 
 def refuse(run: Run, *traits: str) -> None:
-    """Raise Refused if the run has a trait of `nature` other than the given ones."""
+    """Raise Refused if the run has a property (`Run.nature`) other than the given ones."""
     law = "structure is found in boxes at rest" + ", S(k) in periodic ones" * ("walls" in traits)
     allow(run, law, *TRAITS.keys() - set(traits))
 
@@ -59,7 +59,7 @@ def pair_correlation(
     edges : numpy.ndarray
         (B + 1,) edges of the bins of r, in mean diameters
     pair : tuple of str, optional
-        two species, for g(r) of the second around disks of the first [all disks]
+        two species: density of the second around disks of the first [all disks]
 
     Returns
     -------
@@ -98,7 +98,7 @@ def pair_correlation(
 
 
 def masks(run: Run, pair: tuple[str, str] | None) -> list[np.ndarray]:
-    """Return the masks (N,) of the species in `pair`, or only that of all disks."""
+    """Return the masks (N,) of the species in `pair`, or one mask of all disks."""
     return [run.of_species(name) for name in dict.fromkeys(pair)] if pair else [run.species > 0]
 
 
@@ -119,8 +119,8 @@ def structure_factor(
     edges : numpy.ndarray
         (B + 1,) edges of the bins of k, in 1 / mean diameter
     pair : tuple of str, optional
-        two species, for the product of their sums divided by the geometric mean of their numbers of
-        disks [all disks]
+        two species: the sums of both are multiplied, and N is the geometric mean of their numbers
+        of disks [all disks]
 
     Returns
     -------
@@ -265,7 +265,7 @@ def largest_cluster(run: Run, frame: int, gap: float) -> int: ...
 @overload
 def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray: ...
 def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
-    """Return the size of the largest cluster of disks, connected by gaps smaller than `gap`.
+    """Return the size of the largest cluster of disks connected by gaps smaller than `gap`.
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
 
 
 def bond_order(run: Run, frame: Index) -> np.ndarray:
-    """Return the bond-orientational order psi6 of each disk, given by its Delaunay neighbours.
+    """Return the bond-orientational order psi6 of each disk, based on its Delaunay neighbours.
 
     Parameters
     ----------

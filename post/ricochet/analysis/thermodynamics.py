@@ -40,8 +40,8 @@ __all__ = [
 
 TIMED = ("every_time", "at", "per_decade")  # schedules by time rather than by collisions
 MANY = 1e8  # disks above which the effect of a fixed energy is negligible
-# Traits of `nature` with which an equation of state applies. A run without any trait consists of
-# equal smooth disks of conserved energy in a periodic box.
+# Properties of a run (`Run.nature`) with which an equation of state applies. A run without any of
+# them consists of equal smooth disks of conserved energy in a periodic box.
 FLUID = ("walls", "thermal_walls", "thermostatted", "rough", "rotating", "mixture")
 
 
@@ -94,7 +94,7 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
 
 
 def temperature_after(run: Run, start: float) -> SeriesMean:
-    """Estimate kT from the samples after a given time, for a fluctuating kinetic energy."""
+    """Estimate kT from the samples after a given time if the kinetic energy fluctuates."""
     track, time, kt = kt_in_time(run)
     kt, time = kt[time >= start], time[time >= start]
     by_time = (run.parameter("output", f"{track}_{how}") for how in TIMED)
@@ -109,9 +109,9 @@ def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
-    """Estimate the mean kinetic energy in equilibrium of a disk of given mass, without gravity.
+    """Estimate the mean kinetic energy of a disk of given mass in equilibrium without gravity.
 
-    If the total momentum is conserved, it is smaller than kT.
+    If the total momentum is conserved, this energy is smaller than kT.
     """
     bound = (run.n_disks - free_disks(run)) * mass / run.mass.sum()
     moving = 0.5 * mass * float(np.sum(drift(run) ** 2))
@@ -219,7 +219,7 @@ def steps(run: Run, skip: float | None = None) -> Steps:
 
 
 def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return two series such that the ratio of their means is the rate of `amount` over kT^power.
+    """Return two series whose means have the ratio `amount` per time and kT^power.
 
     To first order in the deviation of kT from its mean, the second series is kT^power. The error of
     the ratio thus includes the correlation of `amount` with kT.

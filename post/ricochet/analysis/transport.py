@@ -29,7 +29,7 @@ PER_FREE_TIME = 4  # samples of the moments per mean free time that suffice
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
 # HEAT is the decay time of the heat flux in a dilute gas of equal disks, in mean free times; it is
 # shorter in a denser gas. MEMORY is the lag, in mean free times, at which transport coefficients
-# are evaluated: between MEMORY / 2 and MEMORY, the slope of the mean square of a moment is on
+# are evaluated. Between MEMORY / 2 and MEMORY, the slope of the mean square of a moment is on
 # average less than 0.2 % below its limit at infinite lag.
 HEAT, MEMORY = 2.06, 20.0
 CLOSE = 1e-6  # relative difference below which steps count as equal
@@ -61,7 +61,8 @@ def lags(frames: int, per_decade: int = 12) -> np.ndarray:
 def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
     """Return unwrapped positions and velocities, (T, N, 2) each.
 
-    Along axes where the velocity of the centre of mass is conserved, they are relative to it.
+    Along axes where the velocity of the centre of mass is conserved, both are relative to the
+    centre of mass.
     """
     kept = comoving(run)
     place, velocity = (
@@ -74,8 +75,8 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
     """Return the lag, in frames, at which D is measured.
 
-    It is the time in which sound crosses the box, but at most 1/8 of the shortest run. At longer
-    lags diffusion depends on the size of the box.
+    This lag is the time in which sound crosses the box, but at most 1/8 of the shortest run. At
+    longer lags diffusion depends on the size of the box.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
     kt = td.temperature(run).mean
@@ -89,8 +90,9 @@ def diffusion(run: Run, frames: slice, lag: int, *species: str) -> list[tuple[Se
 
     The first is a quarter of the slope of the mean square displacement between the lags `lag` / 2
     and `lag`, in frames. The second is half the integral of <v(0) v>, averaged over the same range
-    of lags. Between frames a cubic curve with known slopes interpolates; for an exponential decay
-    this changes D by at most 0.2 %. Both errors account for correlations between time origins.
+    of lags. Displacements between frames are interpolated by a cubic curve with known slopes. For
+    an exponential decay, the interpolation changes D by at most 0.2 %. Both errors account for
+    correlations between time origins.
     """
     place, velocity = motion(run, frames)
     disks = [run.mass > 0, *(run.of_species(name) for name in species)]
@@ -115,10 +117,10 @@ def of_paths(x: np.ndarray, v: np.ndarray, step: float, lag: int) -> tuple[Serie
 def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     """Return the sampling interval, and the Helfand moments relative to the centre of mass.
 
-    The moment of momentum has the components xy and (xx - yy) / 2 for the shear viscosity, and (xx
-    + yy) / 2 for the bulk viscosity; that of energy has the components x and y. Each moment has the
-    shape (T, C), and its mean growth is subtracted. RunError is raised if no moments were sampled
-    at equal intervals after `start`.
+    The momentum moment has the components xy and (xx - yy) / 2 for the shear viscosity, and (xx +
+    yy) / 2 for the bulk viscosity. The energy moment has the components x and y. Each moment has
+    the shape (T, C), and its mean growth is subtracted. RunError is raised if no moments were
+    sampled at equal intervals after `start`.
     """
     allow(run, TAKES, "mixture")
     if "helfand_heat" not in run.observables:
@@ -135,7 +137,7 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     momentum = (flown + handed).reshape(-1, 2, 2)
     # The energy moments are converted to the centre-of-mass frame by subtracting the velocity of
     # the centre of mass times the momentum moment. All other terms of the conversion grow linearly
-    # in time and vanish with the mean growth.
+    # in time and disappear when the mean growth is subtracted.
     heat = heat + heat_handed - np.einsum("a,tab->tb", drift(run), momentum)
     xx, xy, yy = momentum[:, 0, 0], momentum[:, 0, 1], momentum[:, 1, 1]
     groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
@@ -150,9 +152,9 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
 def squares(moment: np.ndarray, lag: int) -> np.ndarray:
     """Return the squared change of a Helfand moment during a lag, averaged over its components.
 
-    The moment has the shape (T, C), and the result (T - lag,). Subtracting the mean growth, as
-    `moments` does, reduces the squares on average by the fraction lag / (T - 1), for which the
-    result is corrected.
+    The moment has the shape (T, C), and the result (T - lag,). `moments` subtracts the mean growth,
+    which reduces the squares on average by the fraction lag / (T - 1). The result is corrected for
+    this reduction.
     """
     gain = moment[lag:] - moment[: len(moment) - lag]
     return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))
@@ -168,9 +170,9 @@ def relative_error(samples: int, lag: int) -> float:
     """Return the relative standard error of a coefficient from one component of a moment.
 
     If `lag` is much longer than the decay time of the fluxes, the `samples` values of the moment
-    form a random walk, and the coefficient is a quadratic form of its Gaussian steps. The
-    covariance of two squared increments is then twice the square of the number of steps they have
-    in common.
+    form a random walk. The coefficient is then a quadratic form of the Gaussian steps of this walk.
+    The covariance of two squared increments is twice the square of the number of steps they have in
+    common.
     """
     half, origins = lag // 2, samples - lag
     apart = np.arange(-lag, lag + 1)  # origin of the second increment relative to that of the first
@@ -188,8 +190,8 @@ def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
 
     It is half the slope of the mean squared increment between the lags `lag` / 2 and `lag`. Each
     time origin yields a value. These values are too few, and too far from Gaussian, for an estimate
-    of the error, which is therefore that of `relative_error` for C components. The drift is that of
-    the series of values.
+    of the error. The error is therefore calculated by `relative_error` for C components. The drift
+    is measured in the series of values.
     """
     half = lag // 2
     near, far = squares(moment, half), squares(moment, lag)
