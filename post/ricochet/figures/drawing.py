@@ -34,7 +34,8 @@ LEAST_SHARE = 0.12  # smallest diameter drawn, relative to the mean distance bet
 OUTLINE = 0.08  # width of an outline, relative to the diameter
 LEAST_POINTS = 4.0  # largest diameter to which small disks are enlarged
 ARC_POINTS = 181  # points of the polyline that represents an arc
-# Not snapped to whole pixels, because a straight wall would then have a step where an arc begins.
+# Lines are not snapped to whole pixels, because a straight wall would then have a step where an arc
+# begins.
 WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2, "snap": False}
 
 #: Quantities that can determine the colours of disks, each with its label and its dimension.
@@ -48,7 +49,7 @@ COLOURINGS = {
 
 
 def caption(runs: list[Run]) -> str:
-    """Return a caption with number of disks, contact law, seeds, and the parameters that differ."""
+    """Return a caption: number of disks, contact law, seeds, and parameters that runs differ in."""
     parts = [f"N = {listed({run.n_disks for run in runs})}"]
     restitutions = {run.restitution for run in runs}
     if all(map(np.isfinite, restitutions)):
@@ -71,14 +72,14 @@ def caption(runs: list[Run]) -> str:
 
 
 def stated(name: str, values: set[float]) -> str:
-    """Return the values of a parameter as text, with "event-driven" for a time step of 0."""
+    """Return the values of a parameter as text; a time step of 0 becomes "event-driven"."""
     steps = values - {0.0} if name == "dt" else values
     parts = ["event-driven"] * (steps != values) + [f"{name} = {listed(steps)}"] * bool(steps)
     return " and ".join(parts)
 
 
 def by_chance(runs: list[Run]) -> set[str]:
-    """Return the names of packing fractions that differ only because radii are random.
+    """Return the names of packing fractions whose values differ only because radii are random.
 
     This is the case for species with the same number of disks, mean radius and region.
     """
@@ -93,7 +94,7 @@ def by_chance(runs: list[Run]) -> set[str]:
 
 
 def count_at(run: Run, frame: int) -> dict[str, int]:
-    """Return the number of events or collisions before a frame; {} if the schedule changed."""
+    """Return the number of events or collisions before a frame; {} if `output` was changed."""
     schedule = run.parameters.get("output", {})
     counted = {"events": ["collisions", "side_collisions", "obstacle_collisions"]}
     counted["collisions"] = counted["events"][:1]
@@ -120,7 +121,7 @@ def titled(runs: list[Run]) -> str:
 
 
 def listed(values: set[float]) -> str:
-    """List up to four numbers as text; of more than four, only the extremes."""
+    """Return up to four numbers as text, or the smallest and the largest of more than four."""
     words = [f"{value:g}" for value in sorted(values)]
     return ", ".join(words) if len(words) < 5 else f"{words[0]} to {words[-1]}"
 
@@ -147,7 +148,7 @@ def numbers_of(run: Run) -> dict[str, float]:
 
 
 def colours(count: int, first: int = 0) -> list[str]:
-    """Return `count` colours, from `COLOURS` starting at `first`, or else from a colour map."""
+    """Return `count` of the `COLOURS` from `first` on, or of a colour map if these are too few."""
     if first + count <= len(COLOURS):
         return COLOURS[first : first + count]
     return [to_hex(colour) for colour in plt.get_cmap()(np.linspace(0, 0.9, count))]
@@ -180,8 +181,8 @@ def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
     """Return the upper end of the colour scale of a film: the 99.5 % quantile of the values.
 
-    The values are those in about 40 frames, or, for displacements, which grow with time, in the
-    last.
+    The values are taken from about 40 frames. Displacements grow with time, so that their values
+    are taken from the last frame.
     """
     return top_of(sample_of(run, frames, colour))
 
@@ -206,7 +207,7 @@ def top_of(values: np.ndarray) -> float:
 
 
 def exceeded(values: np.ndarray, low: float, top: float) -> str:
-    """Return the ends of a colour scale that values exceed, as `colorbar` expects it."""
+    """Return which ends of a colour scale are exceeded by values, as a keyword of `colorbar`."""
     ends = bool(np.any(values < low)), bool(np.any(values > top))
     return {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[ends]
 
@@ -245,7 +246,7 @@ def aspect_of(run: Run) -> float:
 
 
 def lone(x: np.ndarray) -> dict[str, Any]:
-    """Return the style of a curve with the abscissas `x`, with a marker for a single point."""
+    """Return the style of a curve with the abscissas `x`; a single point is drawn as a marker."""
     return {"marker": "o", "ms": 3, "clip_on": False} if len(x) < 2 else {}
 
 
@@ -335,7 +336,7 @@ def name_walls(axes: Axes, run: Run) -> None:
 
 
 def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return indices and positions of all disks in the box and of images that overlap it."""
+    """Return indices and positions of all disks in the box, and of images that overlap the box."""
     which = [np.flatnonzero(np.isfinite(position).all(axis=1))]
     places = [position[which[0]]]
     for shift in periods(run):
@@ -373,8 +374,8 @@ def note_on_size(axes: Axes, run: Run) -> str:
 def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
     """Draw disks at `position` (N, 2) with their periodic images, enlarging small disks.
 
-    `array` (N,) holds values for a colour map, or `facecolors` the colours. With values, the disks
-    of all species but the first have a black outline inside their rim.
+    `array` (N,) holds values for a colour map, or `facecolors` the colours. If colours represent
+    values, a black outline inside the rim marks disks of all species but the first.
     """
     which, places = with_images(run, position)
     diameters = drawn_diameters(axes, run)
@@ -382,7 +383,7 @@ def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) ->
     if "array" in style and len(run.names) > 1:
         widths = np.clip(OUTLINE * diameters * points_per_length(axes), 0, 1.5)
         widths = (widths * (run.species > 1))[which]
-        # half of an outline lies outside its ellipse
+        # Half of the width of an outline lies outside its ellipse.
         size = size - widths / points_per_length(axes)
         style = {"edgecolors": "black", "linewidths": widths, **style}
     for name in style.keys() & {"array", "facecolors"}:

@@ -57,7 +57,7 @@ def in_room(run: Run, place: np.ndarray) -> np.ndarray:
 
 
 def sides(run: Run) -> list[dict]:
-    """Return position, motion, temperature and surface velocity of each side of the box."""
+    """Return the position, motion, temperature and surface velocity of each side of the box."""
     places = [end[axis] for axis in (0, 1) for end in (run.lower, run.upper)]
     found = [
         {"place": float(side.get("position", at))}
@@ -92,10 +92,10 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
     """Return the arrays with the data of all disks in each frame.
 
     Positions are 16-bit integers relative to the visible region, velocities relative to the largest
-    component in the frame; for few disks both have full precision. Numbers of collisions are bytes,
-    with 255 standing for `top`. Changes of the image counters along x and y since the previous
-    frame have four bits each. The number of times a disk was recycled is stored modulo 256, and in
-    an open system a 1 marks each disk in the box.
+    component in the frame; for few disks both have full precision. Numbers of collisions are bytes;
+    the byte 255 represents `top`. Changes of the image counters along x and y since the previous
+    frame have four bits each. The number of times a disk was recycled is stored modulo 256. In an
+    open system, a 1 marks each disk in the box.
     """
     found: dict[str, bytearray] = defaultdict(bytearray)
     at_once = max(1, MOST_AT_ONCE // run.n_disks)
@@ -172,7 +172,7 @@ def boundary_names(run: Run, kind: str) -> list[str]:
 
 
 def species(run: Run) -> list[dict]:
-    """Return the properties that the disks of each species have in common."""
+    """Return the properties shared by all disks of a species, for each species."""
     colours = [c if c != "#000000" else "#8a8a8a" for c in map(to_hex, COLOURS)]
     return [
         {
@@ -198,9 +198,9 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
 def curves(run: Run) -> dict:
     """Return the energy of each species and the pressure as functions of time, for small plots.
 
-    They are based on the observables, which are sampled more often than frames. Missing values, and
-    the pressure before the first collision, are None. For an open system, the curves include the
-    number of disks inside, and the numbers that have left and entered.
+    Both are based on the observables, which are sampled more often than frames are stored. Missing
+    values, and the pressure before the first collision, are None. For an open system, the curves
+    include the number of disks inside, and the numbers that have left and entered.
     """
     series, found = {}, {}
     moved = passages(run.observables) if "open" in run.nature else {}

@@ -84,7 +84,7 @@ class Sheet:
     def drawn(
         self, rows: list[list[Panel]], width: float, shape: float | None, warnings: Sequence[str]
     ) -> Figure:
-        """Draw the title, the rows of panels, and below these the notes and warnings."""
+        """Draw the title, the rows of panels, and the notes and warnings below the panels."""
         letters = int(width * LETTERS * SMALLEST / plt.rcParams["legend.fontsize"])
         title = [line for part in self.title.split("\n") for line in wrap(part, letters - 4)]
         below = [(line, "0.25") for note in self.notes for line in wrap(note, letters)]
@@ -123,9 +123,10 @@ class Sheet:
         return figure
 
     def draw_panels(self, figure: Figure, rows: list[list[Panel]], room: float) -> list[float]:
-        """Draw rows of panels, and return their heights [inches], which legends reduce.
+        """Draw rows of panels, and return their heights [inches] without legends.
 
-        If not all rows fit into `room`, the highest ones are drawn lower than their panels require.
+        If not all rows fit into `room`, the highest rows are reduced below the height of their
+        panels.
         """
         alone = all(len(row) == 1 for row in rows)  # one grid aligns the axes of all rows
         parts = figure.add_gridspec(len(rows), 1)
@@ -206,7 +207,7 @@ def height_of(row: Sequence[Panel], width: float) -> float:
 
 
 def largest_height(heights: Sequence[float], room: float) -> float:
-    """Return the largest height of a row for which all rows fit into `room` [inches]."""
+    """Return the limit to the heights of rows with which all rows fit into `room` [inches]."""
     for k, height in enumerate(order := sorted(heights)):
         equal = (room - sum(order[:k])) / (len(order) - k)
         if height >= equal:

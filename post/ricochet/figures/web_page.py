@@ -19,7 +19,7 @@ LAB_MODULES = ("sliders", "values", "lab", "disks", "open_system")
 
 
 def page(run: Run, film: dict | None) -> str:
-    """Return the web page of a film; None stands for a film from the server of --live."""
+    """Return the web page of a film; `film` is None if the server of --live sends the film."""
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
     words = {

@@ -42,7 +42,7 @@ def scale_velocities(simulation: Simulation, factor: float) -> None:
 
 
 def let_in(simulation: Simulation, burst: dict, then: float, usual: dict) -> None:
-    """Let disks enter up to the time `then`; afterwards restore the usual values of the source."""
+    """Let disks enter until the time `then`, and then restore the usual values of the source."""
     simulation.change(burst).advance(time=then).change(usual)
 
 

@@ -26,11 +26,11 @@ def advance_and_record(
 ) -> bool:
     """Advance for at most `patience` [s], calling `record` for each disk-disk collision.
 
-    Stopping the engine at each event does not affect the result, which stays bit-identical. The
-    recorded dictionary holds the time, the indices i and j, the velocities (N, 2) of all disks
-    before and after the collision, and the speeds of approach and separation. `limits` are a time,
-    a number of collisions and a number of events; True is returned if none of them is reached. The
-    box must have no periodic sides.
+    Stopping the engine at each event does not change the result by a single bit. The dictionary
+    passed to `record` holds the time, the indices i and j, the velocities (N, 2) of all disks
+    before and after the collision, and the normal speeds of approach and separation. `limits` are a
+    time, a number of collisions and a number of events; True is returned if none of them is
+    reached. The box must have no periodic sides.
     """
     deadline, recorded = time.perf_counter() + patience, 0
     end, _, last = limits

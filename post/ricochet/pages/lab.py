@@ -31,7 +31,7 @@ NAME = re.compile(r"[\w.-]{1,200}")  # name of a variable or group
 
 
 def printed(*words: str | Path) -> object:
-    """Return the JSON output of the simulation program, ignoring error messages."""
+    """Return the JSON output of the simulation program; its error messages are ignored."""
     done = subprocess.run([find_program(), *words], capture_output=True, text=True, check=False)
     return json.loads(done.stdout or "[]")
 

@@ -137,7 +137,7 @@ def page_of(text: str) -> Callable:
 
 
 class Live:
-    """Film of a run that may be in progress, which the film does not disturb.
+    """Film of a run that may be in progress; showing the film does not disturb the run.
 
     For each request the output file is opened without a lock, and only complete data are read.
     """
@@ -162,11 +162,11 @@ class Live:
         return "" if self.lock_file.exists() else "has stopped"
 
     def answer(self, known: str) -> tuple[bytes, bool]:
-        """Return the film, empty if the page has the latest one, and whether the run has ended."""
+        """Return the film (empty if the page has the latest one), and whether the run has ended."""
         with self.lock:
             end = self.end
-            # A request may fail while the simulation program renames the file; the next one will
-            # succeed.
+            # A request may fail while the simulation program renames the file; the next request
+            # will succeed.
             with suppress(RunError, FileNotFoundError):
                 run = read_run(self.part if self.part.exists() else self.final)
                 stamp = f"{run.n_frames} {end}"
@@ -184,7 +184,7 @@ class Live:
         response = web.Response(body=body, content_type="application/json")
         await response.prepare(request)
         await response.write_eof()
-        # set only after sending, because it stops the server
+        # set only after the answer is sent, because this event stops the server
         self.delivered = self.delivered or ends
         return response
 

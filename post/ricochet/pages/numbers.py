@@ -38,7 +38,7 @@ class SnapshotRun(Run):
 
     @property
     def changes(self) -> list[Change]:
-        """No changes, because the parameters describe the present state."""
+        """Empty, because the parameters already describe the present state."""
         return []
 
     piston_positions = property(Run.piston_positions.func)  # not cached, because pistons move
@@ -125,8 +125,8 @@ def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list
     """Return mean, error and theory of the temperature, the mean speeds and the pressure.
 
     The means over samples in equilibrium have errors that include the autocorrelation. They are
-    omitted if the run does not relax, as theories are where none is known. While the run is too
-    short for a reliable error, `short` is True. `energy` is the present energy of all disks.
+    omitted if the run does not relax, and a theory is omitted if none is known. While the run is
+    too short for a reliable error, `short` is True. `energy` is the present energy of all disks.
     """
     titles = ["temperature"]
     titles += [f"mean speed of {name}" for name in run.names] if run.names[1:] else ["mean speed"]
@@ -153,12 +153,12 @@ def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list
 def relaxed_means(run: Run, columns: np.ndarray, kt: float | None) -> list[SeriesMean | None]:
     """Return the means of temperature, mean speeds and pressure after the relaxation.
 
-    Samples in the first `SPEEDS_FORGET` collisions per disk are left out; there are no means before
-    as many collisions again. An error is NaN if it has too few degrees of freedom, or if slow
-    fluctuations on which the quantity depends have not decayed several times: those of the total
-    momentum change the temperature, and those of the total energy beside a heat bath all
-    quantities. During a fraction of their decay time samples look independent, although all of them
-    deviate alike from the mean.
+    Samples in the first `SPEEDS_FORGET` collisions per disk are left out, and means are returned
+    only after twice this number of collisions per disk. An error is NaN if it has too few degrees
+    of freedom, or if the run is not several times longer than the decay time of slow fluctuations.
+    Fluctuations of the total momentum affect the temperature. Fluctuations of the total energy, in
+    contact with a heat bath, affect all quantities. In a run shorter than their decay time, samples
+    look independent, although all of them deviate from the mean in the same direction.
     """
     tau = columns[KEPT - 1]
     first = max(map(equilibration, columns[KEPT:]))
@@ -189,9 +189,9 @@ def short(mean: SeriesMean) -> SeriesMean:
 def decays(series: np.ndarray, mean: float, variance: float) -> bool:
     """Return whether fluctuations decay at least `DECAYS` times during a series (T,).
 
-    They have decayed at the lag up to which their autocorrelation is below 1/3 on average. This
-    average also decreases slowly if a slow decay modulates oscillations. `mean` and `variance` are
-    those of a very long series.
+    The decay time is the lag at which the autocorrelation, averaged over all shorter lags, is 1/3.
+    This average also decreases slowly for oscillations whose amplitude decays slowly. `mean` and
+    `variance` are the values for a very long series.
     """
     rest = series[:: max(1, len(series) // POINTS)] - mean
     scale, total = max(variance, float(np.mean(rest**2))), 1.0
@@ -255,7 +255,7 @@ def freedoms(run: Run) -> int:
 
 
 def fixed_energy_factor(count: int) -> float:
-    """Return the mean speed at fixed energy over that at fixed temperature.
+    """Return the mean speed at fixed energy, divided by the mean speed at fixed temperature.
 
     The velocities are distributed uniformly on a sphere in `count` dimensions.
     """
@@ -266,7 +266,7 @@ def fixed_energy_factor(count: int) -> float:
 
 
 def conserved_drift(run: Run) -> tuple[float, int]:
-    """Return the centre-of-mass energy along axes of conserved momentum, and their number."""
+    """Return centre-of-mass energy along axes of conserved momentum, and how many these are."""
     free = conserved_momentum(run)
     momentum = np.sum(run.mass[:, None] * run.velocity[0], axis=0)
     return float(np.sum(momentum[free] ** 2) / 2 / np.sum(run.mass)), int(np.sum(free))

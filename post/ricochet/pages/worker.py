@@ -3,16 +3,17 @@
 A request on standard input is a line of JSON. An answer on standard output begins with a letter, b
 for a frame or t for a JSON object, and its length in four bytes. The item "is" of a JSON object is
 "scene" (the constant part of the picture), "numbers", "events" (the next ones), "state",
-"problems", "file" or "scan". The worker waits while the page has not confirmed two frames by the
-request "got".
+"problems", "file" or "scan". The page confirms each frame by the request "got". While two frames
+are not confirmed, the worker waits.
 
 A frame begins with seven numbers of 8 bytes: the time, the collisions per disk, the positions of
-the left, right, bottom and top side, and the sum of 1, 2, 4 and 8 over those of these sides that
-are open. Numbers of 4 bytes follow: positions x, y of all disks, velocities, and angles of rotating
-disks, in the byte order of the computer. They are NaN for disks outside the box.
+the left, right, bottom and top side, and a number that marks the open sides. It is the sum of 1 for
+the left, 2 for the right, 4 for the bottom and 8 for the top side, if these are open. Numbers of 4
+bytes follow: positions x, y of all disks, velocities, and angles of rotating disks, in the byte
+order of the computer. They are NaN for disks outside the box.
 
-Changes are applied only at times at which no event is partly processed, so that the Python script
-of the function `script` can repeat the run bit for bit.
+Changes are applied only at times at which all events have been processed completely. The Python
+script written by the function `script` can therefore repeat the run bit for bit.
 """
 
 import base64
@@ -162,7 +163,7 @@ class Session:
         self.set_disk("velocity", disk, own.tolist() if own.any() else upwards)
 
     def aim(self, request: dict) -> None:
-        """Set the velocity of one disk to the requested one."""
+        """Set the velocity of one disk to the requested value."""
         x, y = map(float, request["velocity"])
         self.set_disk("velocity", int(request["disk"]), [x, y], "aim")
 
@@ -209,7 +210,7 @@ class Session:
             self.send_state(f"the {side} side is closed as soon as no disk overlaps its line")
 
     def insert(self, request: dict) -> None:
-        """Let waiting disks enter through a source at once, at most the requested number."""
+        """Let at most the requested number of waiting disks enter through a source immediately."""
         now, known = self.simulation._settle(), self.simulation._values()
         then = now + AT_ONCE * (now + self.pace or 1.0)
         burst = {"count": int(request["count"]), "interval": then, "start_time": then}
@@ -515,8 +516,8 @@ def scan(request: dict) -> None:
 def measure(text: str, lines: list[str], name: str, seconds: float) -> tuple[float, float | None]:
     """Return the time average of an observable and its error, after at most `seconds`.
 
-    For a count (`COUNTED`) this is the rate of growth. Samples are half a collision per disk apart,
-    and the second half of them is averaged. There is an error only if the run relaxes to
+    For a count (`COUNTED`) this is the rate of growth. Samples are half a collision per disk apart.
+    The second half of the samples is averaged. An error is returned only if the run relaxes to
     equilibrium.
     """
     samples, began = [], time.perf_counter()

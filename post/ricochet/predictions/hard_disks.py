@@ -37,9 +37,10 @@ FLUID = np.array([
     (CLOSE_PACKING / 1.6, 5.4963), (CLOSE_PACKING / 1.5, 6.6074), (CLOSE_PACKING / 1.4, 8.306),
 ])  # fmt: skip
 # Packing fractions and Z of the fluid near freezing. We know no published values between the
-# packing fractions 0.648 and 0.698; the ones given here were computed with Ricochet, from two runs
-# of 8000 disks and 1000 collisions per disk at each packing fraction, with errors below 0.1 %. The
-# value at 0.698, where the fluid freezes, is the published one for 1024^2 disks in `MELTING`.
+# packing fractions 0.648 and 0.698. The values here were computed with Ricochet from two runs of
+# 8000 disks and 1000 collisions per disk at each packing fraction. Their errors are below 0.1 %.
+# The fluid freezes at 0.698. The value at this packing fraction is the published one for 1024^2
+# disks (see `MELTING`).
 FREEZING = np.array([
     (0.66, 8.875), (0.67, 9.350), (0.68, 9.839), (0.69, 10.234),
     (0.698, 9.16934 * math.pi / 4 / 0.698),
@@ -72,7 +73,7 @@ MELTING = {
 
 @cache
 def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
-    """Return splines of Z (1 - eta)^2, which is smooth, and of c in Z_N = Z + c / N."""
+    """Return splines of the smooth function Z (1 - eta)^2, and of c in Z_N = Z + c / N."""
     eta, z = np.concatenate([FLUID, FREEZING]).T
     smooth = scipy.interpolate.CubicSpline(np.append(0, eta), np.append(1, z * (1 - eta) ** 2))
     return smooth, scipy.interpolate.CubicSpline(
@@ -104,8 +105,8 @@ def henderson(eta: Number) -> Number:
 def simulated(eta: ArrayLike) -> np.ndarray:
     """Return Z of the fluid, interpolated between simulations.
 
-    The simulations are published for packing fractions up to 0.648 and for 0.698; those in between
-    were run with Ricochet.
+    Simulations are published for packing fractions up to 0.648 and for 0.698. The simulations at
+    packing fractions between these two were run with Ricochet.
 
     Parameters
     ----------
@@ -161,12 +162,14 @@ def adiabat(
 ) -> np.ndarray:
     """Return the temperatures (W,), relative to the first, of a gas between walls moved slowly.
 
-    The `widths` (W,) are the distances of the two walls, and `height` is that of the other two
-    sides. Unless these are `walled`, momentum along them is conserved and the kinetic energy is
-    (N - 1/2) kT in place of N kT. Work changes it by -F dw, where F is P h minus the tension of the
-    two other walls, and P is that of `simulated`. In scaled particle theory, the tension of a wall
-    is kT n r / (1 - eta), and n r (1 - eta) / (1 + eta) disks per length are missing beside it
-    (Helfand, Frisch and Lebowitz, Journal of Chemical Physics 34, 1037 (1961)).
+    The `widths` (W,) are the distances between the two walls, and `height` is the distance between
+    the other two sides. Unless the other two sides are walls (`walled`), the momentum parallel to
+    the two walls is conserved, and the kinetic energy is (N - 1/2) kT in place of N kT. When the
+    width w changes by dw, work changes the kinetic energy by -F dw. F is the pressure P of
+    `simulated` times the height, minus the tension of the other two walls. In scaled particle
+    theory, the tension of a wall is kT n r / (1 - eta), and the number of disks missing beside the
+    wall is n r (1 - eta) / (1 + eta) per length (Helfand, Frisch and Lebowitz, Journal of Chemical
+    Physics 34, 1037 (1961)).
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FREEZING[-1, 0], 50001)  # far from the walls
@@ -182,7 +185,8 @@ def adiabat(
 def published(eta: float, count: int, periodic: bool) -> float:
     """Return Z from simulations: of the fluid up to eta = 0.648, of the crystal from eta = 0.72.
 
-    In between, Z is NaN. If the box is `periodic`, Z is that of `count` disks.
+    In between, Z is NaN. If the box is `periodic`, Z includes the finite-size correction for
+    `count` disks.
     """
     if eta <= 0.5:
         return float(simulated_finite(eta, count) if periodic else simulated(eta))
@@ -192,10 +196,11 @@ def published(eta: float, count: int, periodic: bool) -> float:
 
 
 def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
-    """Return Z of a fluid of disks of different radii r, from `z` of equal disks and <r>^2 / <r^2>.
+    """Return Z of a fluid of disks of different radii r from `z` of equal disks and <r>^2 / <r^2>.
 
-    The second virial coefficient is exact. If `z` is that of scaled particle theory, so is the
-    result (Santos, Yuste and Lopez de Haro, Molecular Physics 96, 1 (1999)).
+    The second virial coefficient is exact. If `z` is the result of scaled particle theory for equal
+    disks, Z is its result for different radii (Santos, Yuste and Lopez de Haro, Molecular Physics
+    96, 1 (1999)).
     """
     return (1 - alike) / (1 - eta) + alike * z
 
@@ -231,8 +236,8 @@ def collision_rate(
     >>> round(hard_disks.collision_rate(2.0, 1.0, 1e4), 3)
     2.257
     """
-    # c_n is the mean relative speed of two disks in a system of fixed total energy, relative to
-    # that of two disks with Maxwellian velocities.
+    # c_n is the mean relative speed of two disks in a system of fixed total energy, divided by the
+    # mean relative speed of two disks with Maxwellian velocities.
     c_n = math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
     return 4 * (z - 1) * c_n / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
 
@@ -342,7 +347,7 @@ def noise_temperature(
 def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
     """Return the adiabatic speed of sound of the fluid [velocity] for Henderson's Z.
 
-    It is the square root of (d(eta Z)/d eta + Z^2) kT / m.
+    Its square is (d(eta Z)/d eta + Z^2) kT / m.
     """
     step = 1e-6
     slope = ((eta + step) * henderson(eta + step) - (eta - step) * henderson(eta - step)) / step / 2
@@ -392,8 +397,8 @@ def long_time_tail(
 ) -> np.ndarray:
     """Return the long-time tail (T,) of <v(0) v(t)> / <v^2> according to mode-coupling theory.
 
-    `density` is in disks per area; `diffusion`, the diffusion coefficient, and `viscosity`, the
-    kinematic one, are in length^2/time (Dorfman and Cohen, Physical Review Letters 25, 1257
+    `density` is in disks per area; `diffusion` is the diffusion coefficient and `viscosity` the
+    kinematic viscosity, both in length^2/time (Dorfman and Cohen, Physical Review Letters 25, 1257
     (1970)).
     """
     return 1 / (8 * math.pi * density * (diffusion + viscosity) * np.asarray(time))

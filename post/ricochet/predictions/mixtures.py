@@ -17,9 +17,9 @@ __all__ = ["cooling_ratio", "self_diffusion"]
 def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.ndarray:
     """Return the pair correlation functions at contact (S, S) of a mixture, to about 1 %.
 
-    They are those of Jenkins and Mancini, Journal of Applied Mechanics 54, 27 (1987), but with chi
-    of equal disks calculated from `z`, as in Santos, Yuste and Lopez de Haro, Journal of Chemical
-    Physics 117, 5785 (2002).
+    The formulas are those of Jenkins and Mancini, Journal of Applied Mechanics 54, 27 (1987),
+    except that chi of equal disks is calculated from `z`, as in Santos, Yuste and Lopez de Haro,
+    Journal of Chemical Physics 117, 5785 (2002).
     """
     eta = math.pi / 4 * np.sum(density * diameter**2)
     mean = np.sum(density * diameter) / np.sum(density * diameter**2)
@@ -34,8 +34,9 @@ def enskog_mixture(
 
     The theory is the first Sonine approximation of Lopez de Haro, Cohen and Kincaid, Journal of
     Chemical Physics 78, 2746 (1983), in two dimensions. The kinetic part of the shear viscosity is
-    multiplied by 1.022, the effect of higher approximations in a dilute gas of equal disks. The
-    bulk viscosity accounts for the unequal temperatures of the species during an expansion.
+    multiplied by 1.022. In a dilute gas of equal disks, higher approximations increase the
+    viscosity by this factor. The bulk viscosity accounts for the unequal temperatures of the
+    species during an expansion.
     """
     total, pair = mass[:, None] + mass, (diameter[:, None] + diameter) / 2
     reduced = mass[:, None] * mass / total
@@ -44,7 +45,7 @@ def enskog_mixture(
     met = density * pair * contact_values(z, density, diameter)
     # twice this rate applies to temperatures
     rate = met * 2 * np.sqrt(2 * math.pi * kt * reduced) / total
-    # with the transfer in collisions
+    # including the collisional transfer
     handed = 1 + math.pi / 2 * np.sum(met * pair * mass / total, axis=1)
     stress = np.diag(np.sum(rate * (2 + mass / mass[:, None]), axis=1)) - rate
     lives = np.linalg.solve(stress, handed)
@@ -105,7 +106,7 @@ def cooling_ratio(
 ) -> float:
     """Return the ratio of the temperatures of two species in a cooling dilute gas.
 
-    The ratio is that at which both species cool at the same rate. The rates are those of Garzo and
+    At this ratio both species cool at the same rate. The cooling rates are taken from Garzo and
     Dufty, Physical Review E 60, 5706 (1999), in two dimensions, for Maxwellian velocities in each
     species.
 

@@ -22,13 +22,13 @@ Law = Callable[[np.ndarray], np.ndarray]
 
 # Relaxation of a dilute gas of disks with equal initial speeds, from Monte Carlo solutions of the
 # Boltzmann equation with 10^6 disks: collisions per disk, and the second Sonine coefficient a2
-# after as many collisions.
+# after this number of collisions.
 RELAXATION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (-0.5, -0.370, -0.264, -0.184, -0.125, -0.0855, -0.0565, -0.025)]
 )
-# Relaxation of a dilute mixture, in which half of the disks have the mass m and half the mass 4 m,
-# from Monte Carlo solutions of the Boltzmann equation: collisions per disk, and the temperature of
-# the heavy disks over that of the light ones after as many collisions.
+# Relaxation of a dilute mixture, from Monte Carlo solutions of the Boltzmann equation: collisions
+# per disk, and the ratio of the temperatures of heavy and light disks after this number of
+# collisions. Half of the disks have the mass m and half the mass 4 m.
 EQUIPARTITION = np.transpose(
     [(0, 1, 2, 3, 4, 5, 6, 8), (4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005)]
 )
@@ -79,9 +79,9 @@ def maxwell_cdf(u: np.ndarray) -> np.ndarray:
 def finite_n_cdf(count: int, periodic: bool = False) -> Law:
     """Return the exact distribution function of u = v / sqrt(2 kT / m) at fixed total energy N kT.
 
-    In a box with walls, the fraction K / E of the energy that a disk has is distributed as Beta(1,
-    N - 1), for any masses. In a periodic box, for equal disks without total momentum, K N / (E (N -
-    1)) is distributed as Beta(1, N - 2). N is `count`.
+    In a box with walls, the energy of a disk, as a fraction K / E of the total energy, is
+    distributed as Beta(1, N - 1) for any masses. In a periodic box, K N / (E (N - 1)) of equal
+    disks with zero total momentum is distributed as Beta(1, N - 2). N is `count`.
     """
     free, scale = (count - 2, count - 1) if periodic else (count - 1, count)
     return lambda u: 1 - np.clip(1 - np.square(u) / scale, 0, 1) ** free
@@ -133,9 +133,9 @@ def scattering_angle(
     return np.arctan2(2 * kappa * b * cosine, 1 - 2 * kappa * cosine**2)
 
 
-# Steady temperature ratio T_rot / T of cooling rough disks, by normal and tangential restitution
-# (xi, beta), for the moment of inertia m r^2 / 2 and no Coulomb limit of the tangential impulse.
-# From direct simulations of the Boltzmann equation with 10^5 disks; the errors are 0.002.
+# Late temperature ratio T_rot / T of cooling rough disks, by normal and tangential restitution (xi,
+# beta). The moment of inertia is m r^2 / 2, and the tangential impulse has no Coulomb limit. From
+# direct simulations of the Boltzmann equation with 10^5 disks; the errors are 0.002.
 ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055, (0.85, 0.3): 0.708}
 
 
@@ -183,7 +183,7 @@ def rough_temperatures(
 ) -> np.ndarray:
     """Return both temperatures (2, T) of cooling rough disks after tau (T,) collisions per disk.
 
-    `start` holds the initial translational and rotational temperature; the theory is that of
+    `start` holds the initial translational and rotational temperature. The theory is the same as in
     `rough_ratio`.
     """
     a, b, c = rough_rates(xi, beta, inertia)
@@ -198,9 +198,9 @@ def pushed_width(
     """Return mean and variance of the width of a box closed by a piston under a constant force.
 
     The probability density of the width w is proportional to Q(w) (H - F w)^(f/2 - 1), where f is
-    the number of degrees of freedom, `squares` (docs/explanation/theory.md). At equally spaced
-    `widths` (W,), `places` is ln Q of the configuration integral, NaN where unknown, and `energy`
-    is H - F w.
+    the number of degrees of freedom, `squares` (docs/explanation/theory.md). `places` (W,) and
+    `energy` (W,) are ln Q and H - F w at the equally spaced `widths` (W,). Q is the configuration
+    integral; ln Q is NaN where it is unknown.
     """
     log = np.where(np.isnan(places), -np.inf, places) + (squares / 2 - 1) * np.log(energy)
     density = np.exp(log - log.max())
@@ -211,12 +211,12 @@ def pushed_width(
 def demon_share(climb: float, layers: float, xi: float) -> float:
     """Return the fraction of a dilute gas in the fuller of two chambers above a vibrating floor.
 
-    The chambers are connected by a hole at height h. In the steady state the fluxes through it in
-    both directions, proportional to n^2 exp(-m g h / T), are equal (Eggers, Physical Review Letters
-    83, 5322 (1999)). T follows from an energy balance in a chamber of width w with n disks of
-    diameter s: the power n m g V of a floor with a sawtooth motion of velocity V equals the
-    dissipation rate n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w, so that T/m = (2 V w / (n s
-    sqrt(pi) (1 - xi^2)))^2.
+    The chambers are connected by a hole at height h. The flux out of a chamber is proportional to
+    n^2 exp(-m g h / T). In the steady state both fluxes through the hole are equal (Eggers,
+    Physical Review Letters 83, 5322 (1999)). T is determined by the energy balance of a chamber of
+    width w with n disks of diameter s. A floor with a sawtooth motion of velocity V supplies the
+    power n m g V. Collisions dissipate n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w per unit of
+    time. Both are equal if T/m = (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.
 
     Parameters
     ----------

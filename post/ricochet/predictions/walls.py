@@ -16,13 +16,14 @@ def virial_pressure(
 ) -> float:
     """Return the observable `virial_pressure` / kT [1/length^2] of a fluid in a rectangular box.
 
-    It is (F_x L_x + F_y L_y) / (2 A kT), where F is the force on a side and L the mean distance
-    between the centres of disks touching opposite sides. The fluid consists of S species with
-    numbers and radii (S,); the box has the lengths `edges` (2,), and `walls` (2,) marks the axes
-    that are not periodic. The tension of the walls and the disks missing beside them follow from
-    Helfand, Frisch and Lebowitz, Journal of Chemical Physics 34, 1037 (1961), extended to mixtures;
-    the bulk pressure is that of Henderson, with `of_sizes` for mixtures. The result is NaN if the
-    box is too small for a fluid.
+    The result is (F_x L_x + F_y L_y) / (2 A kT). F is the force on a side, and L is the mean
+    distance between the centre of a disk touching this side and the centre of one touching the
+    opposite side. The fluid consists of S species with numbers and radii (S,); the box has the
+    lengths `edges` (2,), and `walls` (2,) marks the axes that are not periodic. The tension of the
+    walls and the number of disks missing beside them are calculated as in Helfand, Frisch and
+    Lebowitz, Journal of Chemical Physics 34, 1037 (1961), extended to mixtures. The bulk pressure
+    is given by Henderson's equation of state, for mixtures with `of_sizes`. The result is NaN if
+    the box is too small for a fluid.
     """
     count, radius, edges, walls = (
         np.asarray(x, dtype=float) for x in (count, radius, edges, walls)
@@ -49,8 +50,9 @@ def virial_pressure(
 def deficit(density: np.ndarray, radius: np.ndarray) -> np.ndarray:
     """Return the number of disks of each species (S,) missing beside a wall, per length.
 
-    By Gibbs' adsorption equation it is the derivative of the tension with respect to the chemical
-    potentials, both taken from the free energy of scaled particle theory.
+    By Gibbs' adsorption equation, this number is the derivative of the tension with respect to the
+    chemical potential of the species. Tension and chemical potentials are derived from the free
+    energy of scaled particle theory.
     """
     own = math.pi * radius**2
     free, total, sizes = 1 - density @ own, density.sum(), density @ radius
@@ -59,6 +61,6 @@ def deficit(density: np.ndarray, radius: np.ndarray) -> np.ndarray:
     mixed = np.outer(own, 2 * math.pi * sizes * radius / free**2)
     areas = np.outer(own, own) * (total / free**2 + 2 * math.pi * sizes**2 / free**3)
     potentials = np.add.outer(own, own) / free + lengths + mixed + mixed.T + areas
-    # Multiplying the derivatives of the chemical potentials by the densities keeps the matrix
-    # regular even if a species has no disks.
+    # The derivatives of the chemical potentials are multiplied by the densities, so that the matrix
+    # is regular even if a species has no disks.
     return np.linalg.solve(np.eye(len(own)) + density[:, None] * potentials, density * slope)

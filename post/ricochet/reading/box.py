@@ -101,7 +101,7 @@ class BoxResults(Results):
 
     @cached_property
     def piston_positions(self) -> dict[int, Series]:
-        """Position in time of each piston and each changed side, by its index in `sides`."""
+        """Position of each piston and each changed side over time, by its index in `sides`."""
         names = (change.name.split(".") for change in self.changes)
         new = {name[1] for name in names if name[0] == "side" and name[-1] in MOVED}
         free = [
@@ -123,10 +123,10 @@ class BoxResults(Results):
         return self.lower - swings[::2], self.upper + swings[1::2]
 
     def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
-        """Return the area of the box minus that of its obstacles, or the area of a round container.
+        """Return the area of the box without its obstacles, or the area of a round container.
 
-        Walls and arcs have no area, even if they enclose a region. Oscillating sides count at their
-        mean positions, as in the pressure that the program writes.
+        Walls and arcs have no area, even if they enclose a region. Oscillating sides are taken to
+        be at their mean positions, as in the pressure that the program writes.
 
         Parameters
         ----------
@@ -175,8 +175,8 @@ def outmost(side: Mapping[str, Any]) -> float:
 def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
     """Return the inward displacement of a moving side at times (docs/explanation/theory.md).
 
-    It is relative to the mean position of an oscillating side, or to the initial position of a side
-    moving at constant velocity.
+    The displacement is relative to the mean position of an oscillating side, or to the initial
+    position of a side moving at constant velocity.
     """
     if side.get("motion") == "constant_velocity":
         start, end = side["start_time"], side["end_time"]

@@ -203,10 +203,10 @@ def in_space(flat: np.ndarray) -> np.ndarray:
 def read_gsd(path: str | Path, frame: int = -1) -> ImportedFrame:
     """Read a frame of a GSD file; the package gsd must be installed.
 
-    For a file not written by `write_gsd`, both axes are taken to be periodic, the origin to be at
-    the centre of the box, and the time to be the time step of the frame. If positions were written
-    in single precision, touching disks may overlap by rounding errors, which Ricochet refuses; in
-    this case multiply the radii by 1 - 1e-6.
+    For a file not written by `write_gsd`, it is assumed that both axes are periodic, that the
+    origin is at the centre of the box, and that the time is the time step of the frame. Ricochet
+    refuses overlapping disks. If positions were written in single precision, touching disks may
+    overlap by rounding errors; in this case multiply the radii by 1 - 1e-6.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def in_words(problem: BaseException) -> str:
 
 
 def imported_gsd(where: str, found: Any) -> ImportedFrame:
-    """Return the disks in a frame of the package gsd; `where` names file and frame in messages."""
+    """Return the disks in a frame of the package gsd; messages begin with `where`."""
     box, particles, log = found.configuration.box, found.particles, found.log
     width, height, *_, xy, xz, yz = box.tolist()
     if any((xy, xz, yz)):
@@ -398,7 +398,8 @@ def read_lammps(path: str | Path, frame: int = -1) -> ImportedFrame:
 
     Positions must be given as x and y, as xu and yu (unwrapped) or as xs and ys (scaled). Optional
     columns are id, element or type (the name of the species), vx, vy, radius or diameter, mass,
-    omegaz and orientation. The time is that of the item TIME or, if this is missing, the time step.
+    omegaz and orientation. The time is read from the item TIME or, if this is missing, equals the
+    time step.
 
     Parameters
     ----------
@@ -477,7 +478,7 @@ def items_of(file: BinaryIO) -> Items:
 
 
 def imported(where: str, items: Items) -> ImportedFrame:
-    """Return the disks in a frame of a dump file; `where` names file and frame in messages."""
+    """Return the disks in a frame of a dump file; messages begin with `where`."""
     kinds, bounds = items["BOX BOUNDS"]
     if len(kinds) != 3:
         raise RunError(f"{where}: its box is tilted; only rectangular boxes can be read")

@@ -35,7 +35,7 @@ class ContactNetwork(NamedTuple):
 
     @property
     def force(self) -> np.ndarray:
-        """Mean force (E,) of each contact, its impulse divided by the length of the window."""
+        """Mean force (E,) of each contact: its impulse divided by the length of the window."""
         return self.impulse / (self.end - self.start)
 
     @property
@@ -140,7 +140,7 @@ def network(run: Run, start: float | None = None, end: float | None = None) -> C
 
 
 def chains(found: ContactNetwork, above: float = 1.0, at_least: int = 3) -> list[np.ndarray]:
-    """Return the force chains, groups of disks connected by strong contacts.
+    """Return the force chains: groups of disks connected by strong contacts.
 
     A contact is strong if its impulse exceeds `above` times the mean over all contacts between
     disks. Such contacts carry the deviatoric load of a granular medium (Radjai and others, Physical

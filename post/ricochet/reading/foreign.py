@@ -33,8 +33,8 @@ GROUPS = ("particles", "bonds", "angles", "dihedrals", "impropers", "constraints
 def check_index(path: Path) -> None:
     """Raise ValueError if a GSD file is shorter than its header or index implies.
 
-    The package gsd trusts the counts and positions in a file. For a damaged one it would allocate
-    too much memory, or read beyond the end of the file.
+    The package gsd trusts the counts and positions in a file. If a file is damaged, gsd would
+    allocate too much memory, or read beyond the end of the file.
     """
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -57,7 +57,7 @@ def check_index(path: Path) -> None:
 
 
 def check_counts(file: Any, path: Path, frame: int) -> None:
-    """Raise ValueError if this or the first frame counts more members than the file has bytes."""
+    """Raise ValueError if this frame or the first lists more members than the file has bytes."""
     for name in (f"{group}/N" for group in GROUPS):
         for k in {0, frame}:
             if not file.chunk_exists(frame=k, name=name):

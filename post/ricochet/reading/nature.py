@@ -45,7 +45,7 @@ TRAITS = {
     "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
-#: Traits of runs whose energy does not only change by dissipation in collisions.
+#: Traits of runs whose energy also changes by processes other than dissipation in collisions.
 SOURCES = {
     "changed",
     "sheared",
@@ -85,7 +85,7 @@ class Nature(frozenset[str]):
 
     @property
     def driven(self) -> bool:
-        """True if the energy of the disks changes otherwise than by dissipation in collisions."""
+        """True if processes other than dissipation in collisions also change the energy."""
         return not self.closed
 
     @property
@@ -128,8 +128,8 @@ def nature_of(
     motions = {one.get("motion", "still") for one in surfaces}
     beta = float(contact.get("tangential_restitution", -1.0))
     pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
-    # A run counts as "inelastic" from the start if disk-disk collisions dissipate energy, but only
-    # after the first loss of energy if nothing but walls does.
+    # If disk-disk collisions dissipate energy, a run is "inelastic" from the start. If only
+    # collisions with walls dissipate energy, it is "inelastic" after the first loss of energy.
     slips = beta > -1 and (beta < 1 or contact.get("friction") is not None)
     inelastic = len(mass) > 1 and (pairs.min() < 1 or slips)
     found = {
@@ -176,7 +176,7 @@ def nature_of(
 
 
 def opens(parameters: Mapping[str, Any]) -> bool:
-    """Return whether disks can leave or enter the box, or could do so before a change."""
+    """Return whether disks can leave or enter the box, now or before a change during the run."""
     species = parameters.get("species", {})
     waiting = any(one.get("waiting", 0) for one in species.values() if isinstance(one, Mapping))
     open_sides = any(one.get("open") for one in parameters.get("side", {}).values())
@@ -242,7 +242,7 @@ def stays_in_box(run: Any) -> None:
 
 
 def allow(run: Any, law: str, *traits: str) -> None:
-    """Raise Refused for any trait not in `traits`; its message ends with `law`."""
+    """Raise Refused for any trait not in `traits`; the error message ends with `law`."""
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:
             raise Refused(f"{getattr(run, 'path', 'the simulation')}: {reason}; {law}")

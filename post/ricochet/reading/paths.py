@@ -37,8 +37,8 @@ def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
     """Return the number (T,) of logged events before each frame."""
     if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
-    # The number of events before a frame follows from the event counts of all disks, even if
-    # several events occurred at exactly the time of the frame.
+    # The number of events before a frame is calculated from the event counts of all disks. This is
+    # correct even if several events occurred at exactly the time of the frame.
     hits = run.event_count[frames].sum(axis=1, dtype=np.int64)
     return np.searchsorted(np.cumsum(1 + (log.j > 0)), hits, "right")
 

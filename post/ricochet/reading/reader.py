@@ -392,7 +392,7 @@ class Run(BoxResults):
         return ((time_mean(time, kinetic) + virial / duration) / area).reshape(2, 2)
 
     def _between(self, name: str, t1: float, t2: float) -> Series:
-        """Return the samples of an observable between those closest in time to `t1` and `t2`."""
+        """Return samples of an observable from the one closest to `t1` to that closest to `t2`."""
         time, value = self.observable(name)
         if not t1 < t2:
             raise RunError(f"{self.path}: the first time, {t1:g}, must be below the second, {t2:g}")
