@@ -92,7 +92,7 @@ def finished(paths: list[Path]) -> list[Path]:
 
 
 def joined(words: Iterable[str]) -> list[str]:
-    """Attach a list such as '-10:' to its option, because argparse would take it for an option."""
+    """Attach a list such as '-10:' to its option; argparse would mistake it for an option."""
     result: list[str] = []
     for word in words:
         if re.fullmatch(r"-\d+[,:][-\d,:]*", word) and result and result[-1].startswith("--"):
@@ -113,10 +113,11 @@ def command_line(
 ) -> Parser:
     """Return a command-line parser, whose help text is the docstring `doc` of the script.
 
-    `one` restricts the script to a single run, `repeated` allows duplicate runs, and `open_systems`
-    runs that disks leave or enter; with the parser default `paired` unfinished runs are used, too.
-    `csv` adds the option --csv. Each further keyword names one of the `OPTIONS` and gives its
-    default, which may be None, or a text saying what the script does without the option.
+    `one` restricts the script to a single run. `repeated` allows duplicate runs, and `open_systems`
+    allows runs in which disks leave or enter the box. With the parser default `paired`, unfinished
+    runs are used, too. `csv` adds the option --csv. Each further keyword is the name of one of the
+    `OPTIONS`, and its value is the default. The default may be None, or a text that describes what
+    the script does without the option.
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
@@ -152,8 +153,8 @@ def report(
 ) -> None:
     """Print the tables, save the figure, and write the file of --csv.
 
-    This file contains `data` or else the first table. The warnings `notes`, and warnings about runs
-    that ended early, appear on stderr and on the figure.
+    This file contains `data` or, if `data` is not given, the first table. The warnings `notes`, and
+    warnings about runs that ended early, appear on stderr and on the figure.
     """
     notes = [
         *(run.termination_note for run in args.runs if run.termination_note),

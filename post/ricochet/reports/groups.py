@@ -101,7 +101,8 @@ def physics(run: Run, expected: Collection[str] = ()) -> dict[str, str]:
 def of_species(own: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parameters of a species without its radius or without its packing fraction.
 
-    One of the two determines the other, except for random radii, whose packing fraction is random.
+    One of the two determines the other one, unless the radii are random. Their packing fraction is
+    then random, too.
     """
     if "packing_fraction" not in own:
         return dict(own)

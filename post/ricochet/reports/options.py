@@ -107,7 +107,8 @@ class Option:
 def shared(name: str, default: Any = None) -> Option:
     """Return one of the `OPTIONS` of several analyses with its default.
 
-    A text as default describes what the analysis does without the option, whose value is then None.
+    A default that is a text describes what the analysis does without the option. Without the
+    option, its value is then None.
     """
     convert, symbol, meaning = OPTIONS[name]
     if isinstance(default, str):
@@ -133,7 +134,7 @@ OPTIONS: dict[str, tuple[Callable[[str], Any], str, str]] = {
 }
 
 
-#: Option names of earlier versions, with the present ones.
+#: Option names of earlier versions, with the present names.
 RENAMED = {"--skip": "--equilibration", "--apart": "--min-separation", "--wave": "--wavenumber"}
 #: Alternative spellings of option names.
 SPELLINGS = {"colour": ["--color"]}
@@ -157,7 +158,7 @@ def late_frames(run: Run, options: SimpleNamespace, warnings: list[str]) -> list
     """Return the frames of --frames that are in the steady state and far enough apart.
 
     If there are none, the last frame is returned. Warnings are added if requested frames are not
-    used, or if the speeds in the first of them may still depend on the initial ones.
+    used, or if the speeds in the first selected frame may still depend on the initial speeds.
     """
     frames, start = (
         chosen_frames(run, options.frames, None),

@@ -96,7 +96,7 @@ class Analysis:
 
 
 def distinct(runs: list[Run]) -> tuple[list[Run], list[str]]:
-    """Return the runs with distinct final states, and a warning if others are left out."""
+    """Return the runs with distinct final states, and a warning if identical runs are left out."""
     if len(runs) < 2:
         return runs, []
     found: dict[bytes, list[Run]] = {}

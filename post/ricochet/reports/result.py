@@ -40,7 +40,7 @@ class Result:
     data
         table for the option --csv of the script [table]
     values
-        results that the groups have in common
+        results common to all groups
     """
 
     table: list[dict[str, Any]]
@@ -66,7 +66,7 @@ class Result:
         return self.table if self.printed is None else self.printed
 
     def figure(self, panel: str | None = None, width: float | str | None = None) -> "Figure | None":
-        """Draw the figure, with no text below 8 points.
+        """Draw the figure, with all text at a size of at least 8 points.
 
         Parameters
         ----------

@@ -20,7 +20,7 @@ Table = dict[str, Any] | list[dict[str, Any]]
 def measured(
     name: str, estimate: Estimate | SeriesMean | None, at: int | tuple[int, ...] = ()
 ) -> dict[str, float | None]:
-    """Return mean and error of an estimate, or of the point `at` of a curve, as two table cells.
+    """Return two table cells: mean and error of an estimate, or of the point `at` of a curve.
 
     Both are None if there is no estimate.
     """
@@ -122,8 +122,8 @@ def text_of(table: Table) -> str:
 def once(notes: Iterable[str], names: set[str]) -> list[str]:
     """Return the warnings without repetitions.
 
-    If several differ only in names of runs and in numbers, only the first of them is returned, with
-    their count.
+    Of warnings that differ only in names of runs and in numbers, only the first is returned, with
+    the number of such warnings.
     """
     kinds: dict[str, list[str]] = {}
     for note in notes:

@@ -47,7 +47,7 @@ def library(files: bool = False) -> ctypes.CDLL:
     path = next((place / name for place in places if (place / name).is_file()), None)
     if path is None:
         raise ProgramError(f"no {name} in {places[-1]}: run make library in a clone", 3)
-    # loaded with local symbols, which do not clash with the HDF5 library of h5py
+    # Local symbols avoid clashes with the HDF5 library of h5py.
     engine = ctypes.CDLL(str(path))
     p, n, text = ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p
     long, real = ctypes.c_int64, ctypes.c_double

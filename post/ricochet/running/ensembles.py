@@ -56,9 +56,9 @@ def sweep(
 ) -> "pandas.DataFrame":
     """Run an input with all combinations of the given values of variables.
 
-    Interrupted member runs are continued and finished ones are not repeated, unless the input has
-    changed in variables that may change on a resume, such as the end of the run; they are then
-    extended.
+    Interrupted member runs are continued. Finished member runs are not repeated, but they are
+    extended if the end of the run or another variable that may change on a resume has a new value
+    in the input.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def sweep(
     >>> list(ricochet.sweep(small, linked, folder / "linked")["collisions"])
     [10, 20]
     """
-    # a missing package is reported before the runs
+    # imported here, so that a missing package is reported before the runs
     optional_package("pandas", "a table of members")
     folder = Path(folder)
     text = read_input(system, folder / "input")
@@ -143,7 +143,7 @@ def choices_of(values: Mapping[str, Any]) -> dict[str, list[Any]]:
 
 
 def combinations(choices: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
-    """Yield the settings of each combination of values, with the first variable varying slowest."""
+    """Yield the settings of each combination of values; the first variable varies slowest."""
     pairs = [[(name, value) for value in own] for name, own in choices.items()]
     yield from map(dict, itertools.product(*pairs))
 
@@ -281,7 +281,7 @@ def put(path: Path, text: str) -> None:
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
     """Return the paths of the finished and the unfinished output of a member run, or None.
 
-    While a finished run is being extended, both exist and the run counts as unfinished.
+    While a finished run is being extended, both files exist, and the run counts as unfinished.
     """
     whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
     unfinished = part if part.is_file() else None
@@ -399,7 +399,7 @@ def last_words(folder: Path, name: str) -> str:
 
 
 def failed(folder: Path, name: str) -> bool:
-    """Return whether the log of a member run ends with a reason why it cannot continue."""
+    """Return whether the log of a member run ends with a reason why the run cannot continue."""
     words = last_words(folder, name)
     return not (files_of(folder, name)[0] or GOES_ON.fullmatch(words))
 

@@ -157,7 +157,7 @@ def example(name: str) -> Path:
 
 
 def whole_threads(threads: int | None) -> int:
-    """Return the number of threads after checking it; 0 stands for the number in the input."""
+    """Check and return the number of threads; 0 means that the input determines the number."""
     if threads is None:
         return 0
     if not isinstance(threads, Integral) or not 1 <= threads <= 1024:
@@ -166,7 +166,7 @@ def whole_threads(threads: int | None) -> int:
 
 
 def find_program() -> str:
-    """Return the path of the program: that of the variable RICOCHET, or the first one found.
+    """Return the path of the program: the value of RICOCHET, or the first path found.
 
     The installed package, the folder `build` of this clone, and PATH are searched in this order.
     """

@@ -65,7 +65,7 @@ class Held:
     """Context manager that locks a simulation against other threads."""
 
     def __init__(self, simulation: Session):
-        """Store the simulation that the `with` statement locks and whose handle it returns."""
+        """Store the simulation; the `with` statement locks it and returns its handle."""
         self.simulation = simulation
 
     def __enter__(self) -> int:
@@ -80,7 +80,7 @@ class Held:
 
 
 def after_fork() -> None:
-    """After a fork, close simulations in the child that other threads were advancing."""
+    """After a fork, close simulations in the child that other threads of the parent advanced."""
     for simulation in ALIVE:
         if not simulation._lock.acquire(blocking=False):
             simulation._handle = None

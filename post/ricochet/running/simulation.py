@@ -4,8 +4,9 @@
         gas.advance(time=1.0)
         gas.position, gas.observable("all/kinetic_energy"), gas.next_events(3)
 
-The library (`make library`) contains the engine of the program. The state is bit-identical to that
-of `build/ricochet` with the same input, whatever the times at which `advance` returned.
+The library (`make library`) contains the engine of the program. The state is bit-identical to the
+state in a run of `build/ricochet` with the same input. It does not depend on the times at which
+`advance` returned.
 """
 
 import math
@@ -139,12 +140,12 @@ class Simulation(State):
         return self
 
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
-        """Write an output file that the command `ricochet INPUT -o path --resume` can continue.
+        """Write an output file with which the command `ricochet INPUT -o path --resume` continues.
 
-        The file holds the present state and samples of the initial state (after a change: samples
-        of the present state). The command checks that there is space for the rest of the run. If
-        variables were changed with `change`, INPUT must contain the new values; the argument
-        `input` writes such a file.
+        The file holds the present state and samples of the initial state. If variables were
+        changed, it holds samples of the present state instead. The command checks that there is
+        space for the rest of the run. If variables were changed with `change`, INPUT must contain
+        the new values; the argument `input` writes such a file.
 
         Parameters
         ----------
@@ -186,8 +187,8 @@ class Simulation(State):
         """Return an independent simulation in the same state.
 
         Copy and original remain bit-identical as long as the same methods are called. `copy.copy`,
-        `copy.deepcopy` and pickles work as well. A pickle contains a checkpoint; a process that
-        loads it needs the initial-configuration file that the input names, if any.
+        `copy.deepcopy` and pickles work as well. A pickle contains a checkpoint. If the input names
+        an initial-configuration file, a process that loads the pickle needs this file.
 
         Returns
         -------
@@ -229,7 +230,8 @@ class Simulation(State):
 
         Without limits, the stop conditions of the input apply. As in a run of the program, the
         simulation ends earlier if no further event can occur, or if a freely cooling gas has cooled
-        to 1e-25 of its initial temperature. After an interrupt (Ctrl-C) it can be continued.
+        to 1e-25 of its initial temperature. After an interrupt (Ctrl-C) the simulation can be
+        continued.
 
         Parameters
         ----------
@@ -375,9 +377,9 @@ class Simulation(State):
         """Advance to a time at which another simulation can reproduce the state; return this time.
 
         After `advance`, `time` may be rounded, and the engine may still have to shift its origin of
-        time. The returned time is slightly later and is reached exactly: it is the sum of the
-        origin and the time since the origin. Since not every number is such a sum, several are
-        tried.
+        time. The returned time is slightly later. It is reached exactly, because it is the sum of
+        the origin and the time since the origin. Not every number is such a sum in floating-point
+        arithmetic, so that several numbers are tried.
         """
         ulps = 0
         while self.time != self._settled:
@@ -389,10 +391,10 @@ class Simulation(State):
     def change(self, values: Mapping[str, Any]) -> Self:
         """Change variables of the simulation at the present time.
 
-        Gravity, driving and collision rules can change, and so can temperatures, velocities and
-        motions of boundaries. The change of the total energy is added to the observable `work`. A
-        side starts a new motion from its present position; variables that belong only to its former
-        motion, such as the force on a piston, are dropped.
+        Variables of gravity, driving and collision rules can be changed, and also temperatures,
+        velocities and motions of boundaries. The change of the total energy is added to the
+        observable `work`. A side starts a new motion from its present position; variables that
+        belong only to its former motion, such as the force on a piston, are dropped.
 
         Parameters
         ----------

@@ -17,7 +17,7 @@ SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as the program 
 #: Columns of an initial-configuration file that are named differently from the arrays.
 TURNING = {"angular_velocity": "omega", "orientation": "angle"}
 
-#: Variables of a species, besides position and velocity, that may differ from disk to disk.
+#: Variables of a species (besides position and velocity) that may differ from disk to disk.
 PER_DISK = ("radius", "mass", "angular_velocity", "orientation")
 NUMBERS = itertools.count(1)
 
@@ -25,8 +25,8 @@ NUMBERS = itertools.count(1)
 def with_start(group: Mapping[str, Any], place: Path | None) -> Mapping[str, Any]:
     """Return a species whose arrays have been written to an initial-configuration file.
 
-    The path of the file begins with `place`; if that is None, the file exists until this process
-    ends.
+    The path of the file begins with `place`. If `place` is None, the file is removed when this
+    process ends.
     """
     columns = {name: group[name] for name in PER_DISK if np.size(group.get(name, 0)) > 1}
     if not columns:

@@ -131,9 +131,8 @@ class State(Session):
     def position(self) -> np.ndarray:
         """Positions of the disks, (N, 2) [length], as a read-only copy.
 
-        Along periodic axes they are inside the box. All of them can be set at once, provided that
-        no disks overlap afterwards; the change of the total energy is added to the observable
-        `work`.
+        Along periodic axes they are inside the box. All positions can be set at once, if no disks
+        overlap afterwards. The change of the total energy is added to the observable `work`.
         """
         return self._column("position")
 
@@ -146,7 +145,7 @@ class State(Session):
     def velocity(self) -> np.ndarray:
         """Velocities of the disks, (N, 2) [length/time], as a read-only copy.
 
-        All of them can be set at once; the change of the total energy is added to the observable
+        All velocities can be set at once. The change of the total energy is added to the observable
         `work`.
         """
         return self._column("velocity")
@@ -192,8 +191,8 @@ class State(Session):
     def present(self) -> np.ndarray:
         """1 for disks in the box and 0 for disks outside, (N,).
 
-        Positions, velocities and angles of disks outside are NaN, and are ignored when set.
-        AttributeError is raised if no disk can leave or enter the box.
+        Positions, velocities and angles of disks outside are NaN; new values for these disks are
+        ignored. AttributeError is raised if no disk can leave or enter the box.
         """
         return self._column("present")
 
@@ -343,7 +342,7 @@ class State(Session):
 
 
 def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return a table of obstacles or walls if a row of the input defines several, or nothing.
+    """Return a table of obstacles or walls if a row of the input defines several, otherwise {}.
 
     Such a row contains the variable `file` or `points`; its coordinates in the table are NaN.
     """

@@ -35,7 +35,7 @@ from ..result import Result
 from ..tables import measured, over_runs, points
 
 PLAIN = {"walls"}  # the only trait with which Enskog's D applies
-#: Traits of a run that exclude equilibrium, but allow the calculation of structure functions.
+#: Traits of runs without equilibrium whose structure functions can nevertheless be calculated.
 RESTLESS = (
     "inelastic",
     "soft_contacts",
@@ -71,7 +71,7 @@ def check(run: Run) -> None:
 
 
 def check_alike(runs: list[Run]) -> None:
-    """Raise RunError if the species of the runs, which are to be combined, differ."""
+    """Raise RunError if runs that are to be combined have different species."""
     kinds = [run.by_species for run in runs]
     for run, own in zip(runs, kinds, strict=True):
         same = [(k.name, k.disks.sum()) for k in own] == [(k.name, k.disks.sum()) for k in kinds[0]]
@@ -200,7 +200,7 @@ def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Fo
 
 
 def enskog(run: Run) -> dict[str, float]:
-    """Return Enskog's D of equal disks, or of each species of a mixture; {} if it has none."""
+    """Return Enskog's D of equal disks, or of each species of a mixture; {} if D is unknown."""
     if run.nature <= PLAIN:
         return {"D_enskog": float(transport.enskog_of(run)["D"])}
     if not run.nature <= {*PLAIN, "mixture"} or not all(kind.alike for kind in run.by_species):

@@ -29,12 +29,12 @@ Law = np.ndarray | float | Room | None
 
 
 def no_law(run: Run) -> None:
-    """Return None, for a quantity without a prediction."""
+    """Return None, because there is no prediction for the quantity."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Quantity of the figure; its prediction `law` is for the mean of `compared(values)`."""
+    """Quantity of the figure; `law` predicts the mean of `compared(values)`."""
 
     label: str
     unit: str
@@ -106,7 +106,7 @@ def found_in(runs: list[Run], quantity: Quantity) -> Found:
 
 
 def late(curve: TimeSeries, compared: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Return those values in the second half of a curve that are compared with the prediction."""
+    """Return the values in the second half of a curve, which are compared with the prediction."""
     time, value = curve
     return compared(value[time >= (time[0] + time[-1]) / 2])
 
@@ -114,8 +114,8 @@ def late(curve: TimeSeries, compared: Callable[[np.ndarray], np.ndarray]) -> np.
 def members_of(group: Group, species: str, show: str, halves: list[np.ndarray]) -> list[SeriesMean]:
     """Return the mean over the second half of each run.
 
-    A run of constant energy yields no error, because its fluctuations do not show the scatter over
-    seeds.
+    For a single run of constant energy the error is unknown, because its fluctuations do not show
+    how its mean depends on the seed.
     """
     members = [correlated_mean(half) for half in halves]
     if show != "temperature" or species:

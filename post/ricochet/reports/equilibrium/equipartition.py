@@ -44,7 +44,7 @@ class Approach(NamedTuple):
 def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int = 3) -> float:
     """Return the interpolated time at which an energy difference (W,) falls below `within`.
 
-    It must stay below for at least `lasting` windows.
+    The difference must stay below `within` for at least `lasting` windows.
     """
     close = gap <= within
     for k in range(len(time) - lasting + 1):
@@ -79,11 +79,11 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
 def over_runs(of: Callable[[np.ndarray], float], both: list[np.ndarray]) -> Estimate:
     """Return a function of the mean energies (2, W) of R runs, with a bootstrap error.
 
-    `both` holds the energies (R, W) of the two species. In 68 % of the bootstrap samples, random
-    choices of R runs, the result deviates by less than the error. The error is NaN if the result is
-    NaN for all runs, or in more than 32 % of the samples. A jackknife is unsuitable: the function
-    jumps where noise raises a curve above a limit, and the omission of one run seldom causes such a
-    jump, but then a far too large error.
+    `both` holds the energies (R, W) of the two species. A bootstrap sample is a random choice of R
+    runs. In 68 % of these samples, the result deviates by less than the error. The error is NaN if
+    the result is NaN for all runs, or in more than 32 % of the samples. A jackknife is unsuitable,
+    because the function jumps where noise raises a curve above a limit. The omission of one run
+    seldom causes such a jump; if it does, the jackknife error is far too large.
     """
     tracks, count = np.array(both), len(both[0])
     mean = tracks.mean(axis=1)

@@ -36,7 +36,7 @@ from ..tables import Table, measured, spread
 MOST_CELLS = 100_000
 LEAST_FLOW = 0.2  # smallest range of the axis of a flow velocity [thermal speeds]
 SIGNIFICANT = 5.99  # 95 % quantile of chi^2 with two degrees of freedom
-#: Mean squared difference of kT_x and kT_y, relative to the squared errors, that is significant.
+#: Limit of significance: mean squared difference of kT_x and kT_y, relative to the squared errors.
 UNEQUAL = 9.0
 BELOW = {"location": "bottom", "pad": 0.03, "aspect": 25}  # position of a colour bar
 #: Axis label of each field: text and quantity.
@@ -153,7 +153,7 @@ def walls(run: Run, axis: int) -> list[dict]:
 
 
 def at_walls(run: Run, axis: int, law: dict) -> list[dict]:
-    """Return kT and velocity of each wall, and those predicted for the gas beside it."""
+    """Return kT and velocity of each wall, and the predicted values for the gas beside it."""
     rows = []
     for wall in walls(run, axis):
         end = 0 if wall["wall"] == ACROSS[axis][0] else -1
@@ -187,8 +187,8 @@ def flow_of(found: dict[str, Estimate]) -> Flow:
 def draw_arrows(axes: plt.Axes, run: Run, cells: tuple[int, int], flow: Flow, colour: str) -> None:
     """Draw the flow as arrows, pale in cells without significant flow.
 
-    The largest significant flow, or the largest flow if none is significant, is represented by an
-    arrow as long as a cell.
+    An arrow as long as a cell represents the largest significant flow or, if no flow is
+    significant, the largest flow.
     """
     size = np.hypot(*flow.u)
     shown = size[flow.significant] if flow.significant.any() else size
@@ -239,7 +239,7 @@ def clip(axes: plt.Axes, run: Run, *maps: Artist) -> None:
 def draw_stream(axes: plt.Axes, run: Run, sides: list[np.ndarray], psi: np.ndarray) -> None:
     """Plot a stream function (NY + 1, NX + 1) in colour, with contour lines."""
     top = float(np.abs(psi).max()) or 1.0
-    # an even number, without a line at 0, where noise dominates
+    # The number is even, so that no contour line is at 0, where noise dominates.
     levels = np.linspace(-top, top, 16)
     filled = axes.contourf(*sides, psi, levels, cmap="RdBu_r", zorder=0.2)
     lines = axes.contour(*sides, psi, levels, colors="0.5", linewidths=0.5, zorder=0.3)

@@ -48,9 +48,9 @@ def samples(run: Run, kind: Species, frames: list[int]) -> Samples:
 def log_slope(values: np.ndarray, limits: tuple[float, float]) -> float:
     """Return the decay constant of exponentially distributed values between two limits.
 
-    It is the maximum-likelihood estimate, for which the mean of the truncated distribution equals
-    that of the values. A line fitted to a histogram would scatter by a third more, owing to nearly
-    empty bins.
+    With this constant, the maximum-likelihood estimate, the mean of the truncated distribution
+    equals the mean of the values. The slope of a line fitted to a histogram would scatter by a
+    third more, because of nearly empty bins.
     """
     inside = values[(values >= limits[0]) & (values <= limits[1])]
     reach = limits[1] - limits[0]
@@ -74,11 +74,11 @@ def fit_limits(
 def slope_of(
     values: np.ndarray, reach: tuple[float, float], laws: np.ndarray, largest: float = np.inf
 ) -> Estimate:
-    """Return the decay constant of values (F, n), divided by that of the law, with its error.
+    """Return the decay constant of values (F, n), divided by the predicted one, with its error.
 
     `reach` is the range of the fit in kT, and `largest` the largest value possible for a disk.
-    `laws` (BLOCKS + 1,) are the slopes for the mean kT of all frames, and of all frames but those
-    of each block (jackknife).
+    `laws` (BLOCKS + 1,) are the slopes for the mean kT of all frames, and for the mean kT without
+    each block of frames (jackknife).
     """
 
     def over(law: float, own: np.ndarray) -> float:
@@ -98,9 +98,10 @@ def blocks_of(frames: int) -> list[np.ndarray]:
 
 
 def warmth(species: list[Samples]) -> np.ndarray:
-    """Return the mean kinetic energy over that of all frames, (BLOCKS + 1,).
+    """Return mean kinetic energies (BLOCKS + 1,), relative to the mean over all frames.
 
-    The first ratio, for all frames, is 1; each of the others leaves out one block of time.
+    The first one is the mean over all frames and equals 1. Each of the others leaves out one block
+    of time.
     """
     energy = np.sum([0.5 * s.mass * s.square.sum(axis=1) for s in species], axis=0)
     rests = [np.delete(energy, own) for own in blocks_of(len(energy))]
@@ -126,8 +127,8 @@ def crowded_heights(
 ) -> list[np.ndarray]:
     """Return the densities at heights (H,), corrected to first order for the excluded area.
 
-    The area that disk centres can reach is `width` wide; a disk does not exclude itself. `share`
-    disks have a fixed total energy, infinitely many if there is a heat bath.
+    The area that disk centres can reach is `width` wide; a disk does not exclude itself. `share` is
+    the number of disks that share a fixed total energy; it is infinite if there is a heat bath.
     """
     numbers = [s.height.shape[1] for s in species]
     ideal = [sharing(s.mass * pull * height, kt, share) for s in species]
@@ -174,7 +175,7 @@ def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, li
 
 
 def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[dict[str, Any]]:
-    """Return the fitted slopes relative to those of the solid and the dashed lines."""
+    """Return the fitted slopes, divided by the slopes of the solid and of the dashed lines."""
     temperature = kt[0]
     grid, crowded = heights(run, species, temperature)
     rows, warm = [], warmth(species)
@@ -199,7 +200,7 @@ def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[d
 
 
 class Laws(NamedTuple):
-    """Values of a species, and two laws of their distribution."""
+    """Values of a species, and two laws for their distribution."""
 
     x: np.ndarray  # (P,) squared speeds or heights
     values: np.ndarray  # (F, n)

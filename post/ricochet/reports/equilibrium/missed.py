@@ -61,8 +61,8 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[SeriesMean, floa
 def missed_of_pairs(rates: list[SeriesMean], exact: list[SeriesMean]) -> Estimate:
     """Return the fraction of missed collisions from pairs of runs with equal seeds.
 
-    Its error is that of the scatter of the pairs or, for a single pair, that of the fluctuations of
-    both rates.
+    The error is estimated from the scatter of the pairs or, for a single pair, from the
+    fluctuations of both rates in time.
     """
     shares = [1 - one.mean / other.mean for one, other in zip(rates, exact, strict=True)]
     if rates == exact:

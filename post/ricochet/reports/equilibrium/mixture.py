@@ -62,7 +62,7 @@ def table(
 
 
 def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
-    """Return about 60 speed bins up to `top`, with any common initial speed at a bin centre."""
+    """Return about 60 speed bins up to `top`; a common initial speed is at a bin centre."""
     speed, width = float(np.mean(start)), top / BINS
     if 0 < speed < top and np.ptp(start) < 1e-9 * speed:
         width = speed / max(1, round(speed / width))

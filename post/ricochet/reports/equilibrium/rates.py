@@ -21,7 +21,7 @@ from ..tables import points
 
 BINS = np.linspace(0, 6, 49)  # free paths over their mean
 BLOCKS = 8  # number of blocks of frames in a single run
-#: Traits of runs with straight free flights whose lengths are distributed alike everywhere.
+#: Traits of runs with straight free flights that have the same distribution of lengths everywhere.
 STRAIGHT = {
     "walls",
     "mixture",
@@ -110,7 +110,7 @@ def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndar
 def mean_and_density(
     runs: list[Run], skip: float | None = None
 ) -> tuple[Estimate, Estimate] | None:
-    """Return the mean free path, and the probability density of free paths over their mean.
+    """Return the mean free path, and the probability density of free paths divided by their mean.
 
     The errors are estimated from the scatter of the runs or, for a single run, of blocks of frames.
     Without an event log, the result is None.
@@ -139,7 +139,7 @@ class Found(NamedTuple):
     start: float  # start of the equilibrium
     means: dict[str, SeriesMean]
     pressures: dict[str, Curve]  # as functions of time
-    # mean free path, and density of free paths over their mean
+    # mean free path, and probability density of free paths divided by their mean
     paths: tuple[Estimate, Estimate] | None
 
 

@@ -25,7 +25,7 @@ from ..tables import measured
 BINS = np.linspace(0, 3, 51)  # u = 1 is at the centre of a bin
 WIDE_BINS = np.linspace(0, 3.06, 18)  # for a histogram of up to `FEW_SPEEDS` speeds
 FEW_SPEEDS = 300
-# Titles of the panel of late frames, those after the initial relaxation, by the state of the gas.
+# Titles of the panel of late frames (after the initial relaxation), by the state of the gas.
 # `EQUILIBRIUM` and `STEADY` are used if the mean kT does not change in the late frames.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"

@@ -27,7 +27,7 @@ COLUMNS = ("i", "j", "contacts", "impulse", "force")
 
 
 class Found(NamedTuple):
-    """Contacts in a time window, a mask of those in chains, and the frame to draw."""
+    """Contacts in a time window, a mask of the contacts in chains, and the frame to draw."""
 
     network: ContactNetwork
     chained: np.ndarray

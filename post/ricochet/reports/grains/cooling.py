@@ -84,9 +84,10 @@ def styles(run: Run) -> list[tuple[str, Any]]:
 
 
 def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
-    """Return the variance of the energies in a species over their squared mean, at tau.
+    """Return the variance of the energies of a species at tau, divided by their squared mean.
 
-    Collisions change it from its initial value to 1, the value for an exponential distribution.
+    Collisions change this ratio from its initial value to 1, the value for an exponential
+    distribution.
     """
     first = run.kinetic_energy(0)[kind.disks]
     start = float(np.var(first) / np.mean(first) ** 2) if np.any(first) else 1.0
@@ -97,8 +98,9 @@ def randomised(run: Run, kind: Species, tau: np.ndarray) -> np.ndarray:
 def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray) -> dict:
     """Return the expected standard deviation of the mean energy of a single run, by species.
 
-    The energies of the disks are taken to be independent, except for their fixed sum in an elastic
-    gas. Inelastic collisions correlate them, so that the true standard deviation is smaller.
+    It is assumed that the energies of the disks are independent, except that their sum is fixed in
+    an elastic gas. Inelastic collisions correlate them, so that the true standard deviation is
+    smaller.
     """
     counts = {kind.name: int(kind.disks.sum()) for kind in run.by_species}
     variances = {
@@ -114,9 +116,9 @@ def expected_scatter(run: Run, energies: dict[str, np.ndarray], tau: np.ndarray)
 
 
 def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
-    """Return the standard deviation over single runs of each energy as a function of time.
+    """Return the standard deviation of single runs, for each energy as a function of time.
 
-    It is measured if there are at least four runs; otherwise it is the expected one.
+    If there are at least four runs, it is measured; otherwise the expected value is returned.
     """
     names = ("all", *runs[0].names)
     if len(runs) >= FEWEST_RUNS:
@@ -130,7 +132,7 @@ def scatter(runs: list[Run], found: Curves) -> dict[str, np.ndarray]:
 def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
     """Return the half-width of the error band of the temperature ratio.
 
-    For fewer than `FEWEST_RUNS` runs it is twice the standard deviation over single runs.
+    For fewer than `FEWEST_RUNS` runs, it is twice the standard deviation of single runs.
     """
     if len(runs) >= FEWEST_RUNS:
         return found["ratio"].error

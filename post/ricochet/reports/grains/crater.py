@@ -33,7 +33,7 @@ def hull(run: Run) -> np.ndarray:
     points = run.position[0][displaced(run)]
     if len(points) < 4:
         return points[:0]
-    # QJ: also if all points lie on a line
+    # QJ: allows that all points lie on a line
     vertices = scipy.spatial.ConvexHull(points, qhull_options="QJ").vertices
     return points[np.append(vertices, vertices[0])]
 

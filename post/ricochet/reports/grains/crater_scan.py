@@ -175,8 +175,8 @@ def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
 def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
     """Fit a power law to a crater size.
 
-    If all points are means over the same beds, their sizes are correlated. The error of the
-    exponent is then estimated by the jackknife over beds.
+    If all points are means over the same beds, the crater sizes at different points are correlated.
+    The error of the exponent is then estimated by the jackknife over beds.
     """
     free = [p for p in curve if p.free]
     x = abscissa(axis, [p.values[axis] for p in free])
@@ -226,7 +226,7 @@ def draw_size(
 def draw_sizes(
     axes: plt.Axes, result: Result, axis: str, names: dict[str, str], own: Sequence[str]
 ) -> None:
-    """Plot several crater sizes against a parameter, with colours for curves or else for sizes."""
+    """Plot several crater sizes against a parameter; colours denote curves or, for one, sizes."""
     scan, run = result.values[axis], result.runs[0]
     shared = [others(axis, curve) for curve in scan]
     varying = [name for name in shared[0] if len({values[name] for values in shared}) > 1]

@@ -88,8 +88,8 @@ def fitted(
 ) -> dict[str, Estimate]:
     """Return C and k of the first fit and the exponent of the second fit, with their errors.
 
-    `error` (M,) are the errors of the reduced rates `y`, each estimated from `runs` values
-    [scatter].
+    `error` (M,) holds the errors of the reduced rates `y`, each estimated from `runs` values.
+    Without it, the errors are estimated from the scatter of the points.
     """
     largest = x.min() - 1e-6
 
@@ -157,7 +157,8 @@ def measured_rates(runs: list[Run], after: float) -> Rates:
 def fit_of(found: Rates) -> dict[str, Estimate]:
     """Fit Beverloo's law to measured rates; return {} for fewer than three widths.
 
-    If the errors of the rates are unknown, the scatter of the points determines those of the fit.
+    If the errors of the rates are unknown, the errors of the fit are estimated from the scatter of
+    the points.
     """
     x, y, error = points(found.rows)
     if found.complete and np.all(error > 0):

@@ -29,7 +29,7 @@ class Cooling(NamedTuple):
     until: Estimate
 
     def shown(self, against: str) -> tuple[np.ndarray, Estimate, np.ndarray, np.ndarray]:
-        """Return time or collisions per disk, K, its law, and where the gas is inhomogeneous."""
+        """Return time or collisions per disk, K, predicted K, and a mask of inhomogeneity."""
         own, tau = self.curves, self.curves["collisions_per_disk"]
         if against == "tau":
             return tau, own["K"], own["law"], tau > self.end
@@ -104,7 +104,7 @@ def draw(result: Result) -> Sheet:
 
 
 def energies(groups: list[Group]) -> list[dict[str, Any]]:
-    """Return the energies after 5, 10 and 20 collisions per disk, as far as the runs reach."""
+    """Return the energies after 5, 10 and 20 collisions per disk, if the runs are long enough."""
     rows = []
     for group in groups:
         found = group.values.curves

@@ -36,7 +36,7 @@ def density_of(run: Run) -> float:
 
 
 def diffusion(run: Run, lags: tuple[float, float]) -> dict[str, float]:
-    """Return D / D_0 measured between two lags, and the mean free time over 1/(2 n R v)."""
+    """Return D / D_0 measured between two lags, and the mean free time divided by 1/(2 n R v)."""
     speed = float(run.speed(0)[0])
     reach = float(run.radius[0] + run.obstacles[0].radius)
     free = reach / (2 * density_of(run) * speed)
@@ -97,6 +97,6 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
 
 MEANING = "two lags between which D is measured, in mean free times [10 30]"
 LAGS = Option("lags", MEANING, (10.0, 30.0), float, ("FROM", "TO"), number=2)
-# random, as if they depended on the seed
+# Their positions are random, as if they depended on the seed.
 PLACES = ("obstacle", "obstacle_rows", "position", "velocity")
 ANALYSIS = Analysis(compute, draw, options=(LAGS,), group_by=by_density, may_differ=PLACES)

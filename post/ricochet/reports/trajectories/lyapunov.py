@@ -21,7 +21,7 @@ LEAST_GROWTH = 1.0  # smallest logarithm of the ratio of the two distances
 
 
 class Divergence(NamedTuple):
-    """Logarithms of the distances of P pairs, and their growth between two distances."""
+    """Logarithms of the distances in P pairs of runs, and the growth between two distances."""
 
     time: np.ndarray  # (T,)
     logarithm: np.ndarray  # (P, T)
@@ -44,8 +44,8 @@ def distance(one: Run, other: Run) -> np.ndarray:
 def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float) -> Divergence:
     """Determine the Lyapunov exponent from the distances (P, T) of P pairs of runs at T times.
 
-    Only the growth up to the distance `largest` counts, without its first fraction `begin` on a
-    logarithmic scale.
+    Only the growth up to the distance `largest` is used. On a logarithmic scale, the first fraction
+    `begin` of this growth is left out.
     """
     with np.errstate(divide="ignore"):
         logarithm = np.log(apart)

@@ -24,7 +24,7 @@ def moving_and_resting(run: Run) -> tuple[int, int]:
 
 
 def law_of(run: Run) -> tuple[float, float]:
-    """Return the mass of the resting disk over that of the moving one, and the restitution."""
+    """Return the mass ratio (resting over moving disk), and the coefficient of restitution."""
     moving, resting = moving_and_resting(run)
     return float(run.mass[resting] / run.mass[moving]), run.restitution
 
@@ -68,7 +68,7 @@ def draw_angles(axes: plt.Axes, result: Result) -> None:
 
 
 def draw_errors(axes: plt.Axes, result: Result) -> None:
-    """Plot the deviation of the scattering angle from the exact one."""
+    """Plot the deviation of the scattering angle from the exact angle."""
     s, error = column(result, "b_over_R12"), column(result, "error_degrees")
     axes.semilogy(s, np.maximum(error, 1e-16), ls="", marker=".", color=COLOURS[0])
     axes.set(xlabel="impact parameter $b/R_{12}$", ylabel="|error| (degrees)")
@@ -81,7 +81,7 @@ def column(result: Result, name: str) -> np.ndarray:
 
 
 def draw(result: Result) -> Sheet:
-    """Plot the scattering angle and its deviation from the exact one."""
+    """Plot the scattering angle and its deviation from the exact angle."""
     angles = Panel("angles", draw_angles, (result,), aspect=0.6)
     return Sheet([[angles], [Panel("errors", draw_errors, (result,), 0.3, share_x="angles")]])
 
