@@ -9,16 +9,16 @@ panels
   energy1, energy2, ...    energies per disk for each xi; bands contain 95 % of single runs
   time, collisions         energies for all xi, divided by the initial mean, against time and
                            against collisions per disk; bands: errors of the means
-  ratio                    temperature of the heaviest over that of the lightest species
+  ratio                    ratio of the temperatures of heaviest and lightest species
 
 table (a row for each restitution)
-  energy_left          mean energy at the end divided by that at the start
+  energy_left          final mean energy divided by initial mean energy
   temperature_ratio    temperature ratio at the end; 1 in equilibrium
   flow_share           share of flows in the kinetic energy; a large share means that the gas is not
                        homogeneous
 
---csv FILE writes all curves: reduced ones against collisions per disk, and in units of the input
-against time.
+--csv FILE writes all curves: relative energies against collisions per disk, and energies in units
+of the input against time.
 
 refuses
   driven, falling or heated disks, disks at rest

@@ -18,8 +18,8 @@ first table (a row for each point)
   in_fit                          1: the point is included in the fit
 
 second table (a row for each fit)
-  exponent     exponent p, with its error from the jackknife over beds with common seeds, or else
-               from the points
+  exponent     exponent p, with its error by the jackknife over beds with common seeds, or from
+               the scatter of the points
   chi2/dof     chi squared over the number of degrees of freedom
 
 refuses

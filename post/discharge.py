@@ -20,8 +20,8 @@ second table (from three widths on)
   C, k         fit of Beverloo's law
   exponent     fitted exponent for k = 1.4, the value of Beverloo et al. (1961) in three dimensions
 
-Random radii (polydispersity) differ between seeds, and so does W.  The errors then follow from the
-scatter of several seeds.
+Random radii (polydispersity) differ between seeds, and so does W.  The errors are then estimated
+from the scatter of several seeds.
 
 refuses
   runs without a mouth, without recycled disks (drive.kind = 'recycle') or without gravity

@@ -4,8 +4,8 @@
 
 Runs with the same initial speed v0 are combined.  The mean energies of the lightest and the
 heaviest species are compared in windows of time.  T_therm is the time after which they differ by
-less than --within in three successive windows.  Few runs overestimate it: ten runs of 60 disks by
-16 %, 100 runs by less than 1 %.
+less than --within in three successive windows.  With few runs T_therm is too large: by 16 % for ten
+runs of 60 disks, and by less than 1 % for 100 runs.
 
 panels
   start1, start2, ...    energies of both species against time for each v0

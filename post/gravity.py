@@ -2,10 +2,11 @@
 
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
-The solid lines are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT), exact for
-many point particles; h is the height of a centre above its lowest position.  The dashed lines allow
-for the fixed total energy of N disks and, to first order, for the area that disks exclude.  Slopes
-are maximum-likelihood fits up to m v^2 / 2 = 5 kT, and for m g h between kT and 5 kT (or the lid).
+The solid lines are P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT), where h is
+the height of a centre above its lowest position.  These laws are exact for many point particles.
+The dashed lines allow for the fixed total energy of N disks and, to first order, for the area that
+disks exclude.  Slopes are maximum-likelihood fits: to speeds with m v^2 / 2 up to 5 kT, and to
+heights with m g h between kT and 5 kT (or up to the lid).
 
 panels
   speeds, speeds_log      histograms of v^2 on linear and logarithmic axes
@@ -13,8 +14,8 @@ panels
 
 first table (a row for each species)
   kT, K, K_x                     temperature, kinetic energy and its part along x
-  speed_slope, height_slope      fitted slope divided by that of the solid line; error: jackknife
-  speed_shared, height_crowded   slope of the dashed line divided by that of the solid line
+  speed_slope, height_slope      fitted slope (jackknife errors) over slope of the solid line
+  speed_shared, height_crowded   slope of the dashed line divided by the slope of the solid line
   height_fit_to                  upper end of the fit [kT / m g]
 
 second table

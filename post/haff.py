@@ -3,8 +3,9 @@
     python post/haff.py runs/haff/*.h5 -o haff.png --csv haff.csv
 
 Runs with the same coefficient of restitution xi are combined.  The laws hold while the gas is
-homogeneous and its species have one temperature.  Let tau be the number of collisions per disk: the
-homogeneous state ends when the cooling rate -d ln K / d tau stays below 90 % of the predicted rate.
+homogeneous and its species have one temperature.  Let tau be the number of collisions per disk.
+The homogeneous state ends when the cooling rate -d ln K / d tau stays below 90 % of the predicted
+rate.
 
 panels
   time, collisions                kinetic energy K against time in mean free times 1/w0, with Haff's

@@ -3,10 +3,10 @@
     python post/lyapunov.py runs/pairs/*.h5 -o lyapunov.png --csv lyapunov.csv
 
 The first two runs form a pair, the next two another, and so on.  Both runs of a pair start almost
-at the same point and have frames at the same times.  The exponent is the growth of the logarithm of
-their distance between two fixed distances, divided by the mean time of this growth (Aurell and
-others, J. Phys. A 30, 1 (1997)).  A mean slope in a fixed interval of time would be too small, by
-3 % in Sinai's billiard.
+at the same point and have frames at the same times.  The distance within a pair grows from one
+fixed value to another.  The exponent is the growth of the logarithm of the distance, divided by the
+mean time of this growth (Aurell and others, J. Phys. A 30, 1 (1997)).  A mean slope in a fixed
+interval of time would be too small, by 3 % in Sinai's billiard.
 
 panels
   distances    distance of each pair (Euclidean), geometric mean, fitted growth

@@ -2,10 +2,10 @@
 
     python post/missed.py runs/rates_events/*.h5 runs/rates_steps/*.h5 -o missed.png
 
-Event-driven and time-stepped runs with equal seeds are compared in equilibrium.  A time step dt
-detects an overlap only at its end, and misses a pair that separates within the step.  For a pair
-with relative speed g and sum of radii s this has the probability P(q) with q = g dt / s.  The
-expected fraction is the mean of P over all pairs.
+Event-driven and time-stepped runs with equal seeds are compared in equilibrium.  A time-stepped run
+detects overlaps only at the end of a step dt, and misses the collision of a pair that separates
+within the step.  For a pair with relative speed g and sum of radii s this has the probability P(q)
+with q = g dt / s.  The expected fraction is the mean of P over all pairs.
 
 panels
   missed    missed fraction against dt, with the expected fraction

@@ -4,8 +4,8 @@
 
 The theory assumes Maxwell's distribution of velocities (Luding et al. 1998).  Direct simulations of
 the Boltzmann equation yield a ratio T_rot / T that is up to 6 % smaller.  Flows that develop in the
-cooling gas reduce it further, by 3.8 to 4.6 % at a packing fraction of 0.02 and by 0.3 to 0.5 % at
-0.0025.
+cooling gas reduce the ratio further, by 3.8 to 4.6 % at a packing fraction of 0.02 and by 0.3 to
+0.5 % at 0.0025.
 
 panels
   temperatures    T = m <v^2> / 2 and T_rot = I <omega^2> against collisions per disk

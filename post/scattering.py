@@ -3,9 +3,9 @@
     python post/scattering.py runs/scattering/*.h5 -o scattering.png --csv scattering.csv
 
 Each run contains two disks, one of them at rest at the start.  The impact parameter b is positive
-if the moving disk passes on the left, and R12 is the sum of the radii.  The exact angle theta for
-the mass ratio M (resting over moving disk) and the restitution xi follows from
-tan theta = 2 kappa s c / (1 - 2 kappa c^2), where s = b / R12, c^2 = 1 - s^2 and
+if the moving disk passes on the left, and R12 is the sum of the radii.  M is the mass of the
+resting disk divided by the mass of the moving disk, and xi is the restitution.  The exact angle
+theta is given by tan theta = 2 kappa s c / (1 - 2 kappa c^2) with s = b / R12, c^2 = 1 - s^2 and
 kappa = (1 + xi) / 2 * M / (1 + M).
 
 panels

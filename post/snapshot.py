@@ -9,7 +9,7 @@ colours (--colour)
   displacement      distance from the position in the first frame
   collisions        number of collisions since the start
   spin              angular velocity of disks that can rotate
-  psi6              phase of the bond order of a disk, relative to that of the mean of all disks
+  psi6              phase of the bond order of a disk, relative to the mean of all disks
 
 picture
   lines, outlines   orientations of rotating disks; species other than the first
@@ -80,7 +80,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
     longest = max(float(np.nanmax(run.speed(frame), initial=0)) for frame in frames) or 1.0
     # The longest velocity arrow is as long as a tenth of the box.
     arrows = {"angles": "xy", "scale_units": "xy", "scale": longest / (0.1 * run.edges.max())}
-    # Heads of short arrows shrink, and arrows beyond the walls are not cut.
+    # Short arrows have small heads, and arrows that extend beyond the walls are drawn completely.
     arrows |= {"width": 0.005, "minshaft": 2, "clip_on": False, "zorder": 4, "color": "0.2"}
     if colour == "species":  # darker shades of the colours of the disks, for contrast
         dark = to_rgba_array(drawing.species_colours(run)) * (0.6, 0.6, 0.6, 1)

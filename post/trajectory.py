@@ -30,8 +30,8 @@ def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
     """Return the path (T', 2) of each disk through the given frames.
 
     A path that crosses a periodic side is extended beyond this side and continues from the opposite
-    side of the box. A row of NaN separates the two pieces, and likewise the pieces of a path before
-    and after a disk is recycled.
+    side of the box. A row of NaN separates the two pieces. If a disk is recycled, a row of NaN
+    separates its paths before and after this moment.
     """
     paths = np.moveaxis(run.position[frames][:, disks], 1, 0)
     counts, images = np.zeros(paths.shape[:2]), np.zeros(paths.shape, dtype=int)
