@@ -133,7 +133,7 @@ const back = () => step(frameTime(moment.frame) < moment.time ? moment.frame : m
 const next = () => { if (!source.goOn?.('step')) step(moment.frame + 1); };
 const toEvent = () => { if (!$('event').hidden && !source.goOn?.('event')) go(source.nextEvent()); };
 
-// While the film is paused, the address of the page contains the time shown, so that it can serve as a link to that time.
+// While the film is paused, the address of the page contains the time shown and is thus a link to this time.
 let remembering;
 function remember() {
   clearTimeout(remembering);
@@ -202,7 +202,7 @@ function grabAt(px, py, event) {
   return side < 0 ? null : { ...own, side, away: side < 2 ? away(place, 0) : away(0, place), told: -Infinity };
 }
 
-// Returns whether dragging must not scroll the page. A vertical motion along a left or right side does scroll it.
+// Returns whether a drag must not scroll the page. A vertical motion along a left or right side scrolls the page.
 const keepsFromScrolling = () => grabbed !== null && !(grabbed.side < 2);
 
 function drag(px, py) {
@@ -255,7 +255,7 @@ function pointerMoved(event) {
 }
 
 // Returns the disk nearest to a point of the canvas, or null if the point is farther than `distance` [CSS pixels] from its rim.
-// The disk is one of a list, by default of all disks.
+// Only the disks in `list` are searched, by default all disks.
 function diskAt(px, py, distance, list = Array(disks).keys()) {
   let nearest = null, least = distance * page.dots;
   for (const i of list) {

@@ -2,7 +2,8 @@
 
 // In the laboratory, the page of a run of two to four disks between walls has a panel with momenta, energies and the last
 // collision. While the film is paused at its newest frame, the tips of the velocity arrows can be dragged, and masses and
-// velocities can be edited in the panel. At the start of a run this changes its input, later the moving disks.
+// velocities can be edited in the panel. At the start of a run, these edits change the input; later, they change the moving
+// disks.
 const NO_SPEED = 1e-9;  // fraction of the typical speed below which a velocity is shown as 0
 // typical speed and mass of the arrows; disk-disk collisions so far
 const encounter = { input: '', speed: 1, mass: 1, collisions: [], rows: '' };
@@ -78,7 +79,7 @@ function dragTip(i, x, y) {
 
 const nameIfAlone = i => kinds[speciesOf[i]].count === 1 ? kinds[speciesOf[i]].name : null;
 
-// Changes the velocity or position of a disk, at the start of a run in its input, later in the running simulation.
+// Changes the velocity or position of a disk. At the start of a run its input is changed, later the running simulation.
 function redefine(i, variable, values) {
   if (isEncounter() && last() === 0 && nameIfAlone(i)) parent.redefine(nameIfAlone(i), variable, values);
   else if (variable === 'position') send({ do: 'place', disk: i, position: values });

@@ -144,9 +144,10 @@ function displacement(i) {
   return Math.hypot(UX[i] + x - origins[2 * i], UY[i] + y - origins[2 * i + 1]);
 }
 
-// Returns the free flights of a disk between two times. A flight has a start, an end, and the offset of the control point of its
-// parabola, (0, 0) for a straight line. Without an event log, straight lines connect the positions in successive frames. Paths of
-// recycled disks between the frames before and after, and of disks outside the box, are left out.
+// Returns the free flights of a disk between two times. A flight has a start, an end, and the offset of the control point of
+// its parabola, (0, 0) for a straight line. Without an event log, straight lines connect the positions in successive frames.
+// Paths of disks outside the box are left out. So is the path of a recycled disk between the frames before and after it was
+// recycled.
 function flights(i, from, to) {
   const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
   for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {

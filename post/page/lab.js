@@ -279,7 +279,7 @@ function run() {
   if (isThere(box)) begin(); else box.frame.onload = begin;  // replaces an earlier request that waits for the frame
 }
 
-// Applies a change while the slider moves, if a running simulation allows it, or else starts a new run.
+// If the variable can change in a running simulation, applies the change while the slider moves. Otherwise starts a new run.
 function changed(key) {
   if (busy || !acts(key) || !current()?.run) { run(); return; }
   latest[key] = state.settings[key] ?? givenAs(key);
@@ -320,8 +320,9 @@ function hear(source, news) {
 
 function ready() { busy = 0; if (again) run(); }
 
-// Shows each error message once, beside the variable that caused it or, if it names none, beside the variable that changed last.
-// The refused text stays in the form while the variable keeps its old value. All changes without errors take effect.
+// Shows each error message once: beside the variable that caused the error or, if the message names no variable, beside the
+// variable that the user changed last. The refused text stays in the form while the variable keeps its old value. All changes
+// without errors take effect.
 function showProblems(problems) {
   const changes = () => Object.keys({ ...state.has, ...state.settings }).filter(differs), before = changes();
   for (const { place, text } of problems) {
@@ -446,9 +447,9 @@ setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
 
 // ---------- the time of compared runs ----------
 
-// The newest film determines the time that all films show. The next time is requested from all worker processes, and shown once
-// the slowest has reached it. While a film replays stored frames, the requested times are those of its frames, except times at
-// which another film has no frame and would have to show an earlier one.
+// The newest film determines the time that all films show. All worker processes advance to a requested time, which is shown
+// when the slowest process has reached it. While a film replays stored frames, the times of its frames are requested. A time is
+// left out if another film has no frame at this time and would have to show an earlier one.
 const clock = { next: null, shown: 0 };  // time requested; when the films were last drawn [ms]
 function conducts(source) {
   if (!isComparing()) return false;

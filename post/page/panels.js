@@ -22,8 +22,8 @@ function tell() {
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) ${isInside(i) ? `at <b>${short(X[i])}, ${short(Y[i])}</b>` : 'is outside'}`).join('<br>');
 }
 
-// Marks the times at which the run was changed behind the time line, because browsers draw no background for a slider. The thumb
-// of the slider is 16 pixels wide, and a mark 2.
+// Marks on the time line the times at which the run was changed. An element behind the slider shows the marks, because browsers
+// draw no background for a slider. The thumb of the slider is 16 pixels wide, and a mark 2.
 function markChanges() {
   const shares = film.changes.map(([time]) => (time - first()) / (last() - first() || 1)).filter(share => share >= 0 && share <= 1);
   const marks = shares.map(share => `linear-gradient(var(--accent), var(--accent)) calc(7px + ${share} * (100% - 14px)) 50% / 2px 60% no-repeat`);
@@ -257,8 +257,8 @@ function tellBars() {
   if ($('bars').textContent !== words) $('bars').textContent = words;
 }
 
-// Returns the histogram of the speeds in this film, and the energies of its Maxwell curves, both of which other films on the page
-// draw for comparison.
+// Returns the histogram of the speeds in this film, and the energies of its Maxwell curves. Other films on the page draw both
+// for comparison.
 function speedsOfFilm() {
   const isSettled = settled(), energies = kinds.map((_, s) => (isSettled ? film.curves?.mean?.[s] : null) ?? moment.kinetic[s]);
   return { kinds, counted, settled: isSettled, energies, ...film.speeds, ...speedsNow() };
@@ -304,8 +304,8 @@ const ENERGIES = { kinetic: [], potential: [5, 3], rotational: [1.5, 2.5] }, DAS
 let cursorAt;      // conversion of times to pixels
 let overlaid = [];  // compared runs in the same plots: letter, curves, kinds, and functions for present speeds and numbers
 
-// Curves of compared runs have the colours of the runs, unless several species need colours.
-// Without a letter, the colour is that of the present run.
+// Curves of compared runs have the colours of the runs, unless several species need colours. Curves without a letter have the
+// colour of the present run.
 const RUN_COLOURS = ['#0072b2', '#d55e00', '#009e73', '#b5649a'];
 function runColour(letter) { return RUN_COLOURS[(letter.charCodeAt(0) - 65) % RUN_COLOURS.length]; }
 const hasRunColours = () => overlaid.length > 0 && kinds.length === 1;
@@ -417,8 +417,8 @@ function numbersNow() {
   return means.map((one, k) => ({ ...one, now: now[k] ?? null }));
 }
 
-// For a single run, the table lists the present, mean and theoretical value of each quantity; for several runs, the mean (or else
-// the present value) and the theoretical value for each of them.
+// For a single run, the table lists the present, mean and theoretical value of each quantity. For several runs, it lists the
+// mean (or the present value if there is no mean) and the theoretical value of each run.
 function tellNumbers() {
   const own = numbersNow(), seen = value => value === null ? '' : short(value), some = (rows, what) => rows.some(one => one[what] !== null);
   $('measured').hidden = !own.length;

@@ -103,8 +103,8 @@ function drawStage() {
   drawMarks();
 }
 
-// Sets the line style of a side or an obstacle: thermal boundaries have the colour for hot if they are the hottest, otherwise the
-// colour for cold, and sliding boundaries have moving dashes. Returns true if the boundary is thermal or slides.
+// Sets the line style of a side or an obstacle. The hottest thermal boundaries have the colour for hot, all other thermal
+// boundaries the colour for cold. Sliding boundaries have moving dashes. Returns true if the boundary is thermal or slides.
 const actsOn = law => !!(law && (law.temperature || law.surface_velocity));
 function drawLike(law, along = 1) {
   const dash = 7 * page.dots;
@@ -150,8 +150,8 @@ function drawGround() {
   ground.setLineDash([]);
 }
 
-// Draws an obstacle, or, if it is smaller than a pixel, a square of the same area, which is much faster. Circles are drawn
-// clockwise; the positive direction of a sliding circle is counter-clockwise.
+// Draws an obstacle. An obstacle smaller than a pixel is drawn as a square of the same area, which is much faster. Circles are
+// drawn clockwise; the positive direction of a sliding circle is counter-clockwise.
 function drawObstacle([x, y, radius, inside, from, to], k) {
   const size = radius * view.unit, half = 0.886 * size;
   if (to !== undefined) { drawArc([x, y, size, from, to], k); return; }
@@ -238,8 +238,8 @@ function drawDisk(x, y, radius, colour, stripes, [left, top, right, bottom]) {
   }
 }
 
-// Returns the new colour of a pixel at the rim of a disk, which covers the fraction `covered` of it (0 to 255). If several disks
-// cover parts of the pixel, their colours are mixed and the covered fractions added.
+// Returns the new colour of a pixel at the rim of a disk. The disk covers a fraction of the pixel, `covered` (0 to 255). If
+// several disks cover parts of the pixel, their colours are mixed and the covered fractions added.
 function painted(old, colour, covered) {
   const there = old >>> 24;
   if (there === 0) return colour & 0xffffff | covered << 24;

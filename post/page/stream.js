@@ -125,7 +125,8 @@ function take(buffer) {
   // The interval between two frames is so short that no disk moves farther than half of the box.
   cross(frame, ({ place }, k) => film.periodic[k % 2] ? Math.round((place[k] - frame.place[k]) / film.edges[k % 2]) : 0);
   const isFirst = !past.length, follows = stream.live && moment.time === past.at(-1)?.time;
-  // At a start the same time occurs again; a change acts at a time that is later by only a rounding error.
+  // A new frame replaces the last one if both have the same time (at a start), or if their times differ only by a rounding
+  // error (after a change).
   if (frame.time - past.at(-1)?.time <= SAME_TIME * Math.abs(frame.time)) past.pop();
   past.push(frame);
   if (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past = past.filter((_, k) => k % 2 === 0 || 2 * k > past.length);
@@ -231,8 +232,8 @@ function join(time) {
 // Returns whether the film has a frame at a given time, or can still compute one.
 function canShow(time) { return !(past.at(-1)?.time >= time) || past[frameAt(time)].time === time; }
 
-// Returns the time of the last frame between two times that satisfies a condition or, if there is none, of the first later frame
-// that does; null if no frame after the first time does.
+// Returns the time of the last frame, between two times, that satisfies a condition. If there is none, returns the time of the
+// first later frame that satisfies the condition, or null.
 function frameBetween(from, to, condition) {
   let found = null;
   for (const { time } of past.slice(frameAt(from) + 1)) {
@@ -268,8 +269,8 @@ function replay() {
   play(true);
 }
 
-// Shows the film beside others, with a picture of the given size and distance from the left edge of the page, or on the whole
-// page if `size` is missing. A `bare` film has neither controls nor plots.
+// Shows the film beside others: `size` is the size of its picture, at the given distance from the left edge of the page.
+// Without `size`, the film fills the whole page. A `bare` film has neither controls nor plots.
 let boxSize = null;  // { left, width, height } [CSS pixels]
 function arrange(size, bare) {
   boxSize = size;
