@@ -2,11 +2,11 @@
 
 # Benchmarks: cost of collisions, of the start of a run and of the output. docs/explanation/performance.md explains the results.
 #
-# A rate is the number of collisions, in millions, per second of processor time, measured on one core in runs that also sample
-# observables; the printed rate is the median of RUNS=5 runs. Before each measurement, the system is simulated until it is
-# independent of its initial state. No other program should run meanwhile. The environment variable RICOCHET names the measured
-# program (default build/ricochet). --check requires a program compiled without AVX-512 instructions, which valgrind cannot
-# execute.
+# A rate is the number of collisions per second of processor time, in millions. It is measured on one core, in runs that also
+# sample observables. The printed rate is the median of RUNS=5 runs. Before each measurement, the system is simulated until it
+# is independent of its initial state. No other program should run meanwhile. The environment variable RICOCHET names the
+# measured program (default build/ricochet). --check requires a program compiled without AVX-512 instructions, which valgrind
+# cannot execute.
 #
 # Examples:
 #
@@ -178,7 +178,8 @@ processes() {
   printf '%-52s%8.2f times as fast, at least 1.9\n' 'four runs on two cores' "$(awk -v one="$one" -v two="$two" 'BEGIN { print one/two }')"
 }
 
-# faster WHAT LEAST NAME COLLISIONS [OPTION...]: prints the wall time of complete runs with one thread over that with two.
+# faster WHAT LEAST NAME COLLISIONS [OPTION...]: prints the speedup of complete runs: the wall time with one thread, divided by
+# the wall time with two threads.
 faster() {
   local what=$1 least=$2 k threads
   shift 2
@@ -239,8 +240,8 @@ counted() {
   awk '/Collected/ { print $4 }' "$work/count"
 }
 
-# obstacles NAME: writes the input file $work/NAME.nml with one disk among 1225 circular obstacles: randomly placed, one per unit
-# of area; in the regular pattern of a pegboard; or as a Lorentz gas.
+# obstacles NAME: writes the input file $work/NAME.nml with one disk among circular obstacles. NAME selects a square lattice of
+# obstacles, the pattern of a pegboard, or the Lorentz gas of an input file.
 obstacles() {
   local file=$work/$1.nml kind=${1%_*} number=${1#*_}
   case $kind in

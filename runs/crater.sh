@@ -5,8 +5,8 @@
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 # Each parameter is varied over ten values, with eight beds (seeds) for each, while the other three keep their standard values:
-# mass 25, speed 5, radius 5 and restitution 0.5. Since hard disks have no energy scale, the crater does not depend on the speed.
-# A constant contact time (TC model) would introduce such a scale, so it is chosen proportional to 1/speed.
+# mass 25, speed 5, radius 5 and restitution 0.5. Since hard disks have no energy scale, the crater does not depend on the
+# speed. A constant contact time (TC model) would introduce such a scale. The contact time is therefore proportional to 1/speed.
 member() { # mass speed radius restitution seed
   local contact_time
   contact_time=$(awk -v v="$2" 'BEGIN { printf "%.17g", 5e-5 / v }')

@@ -199,9 +199,9 @@ run_member() {
     [[ -n $resume && $(last_words "${names[$1]}") == *": its run broke off "* ]] || break
     resume= # start again from the beginning
   done
-  # While the script is being stopped, a member run with a negative exit status, or one of at least 127, counts as stopped, too:
-  # it was stopped during its start, or while bash waited for it a second time. The exit status -1 means that bash has lost the
-  # exit status.
+  # While the script is being stopped, a member run counts as stopped, too, if its exit status is negative or at least 127. Such
+  # a member run was stopped during its start, or while bash waited for it a second time. The exit status -1 means that bash has
+  # lost the exit status.
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
   if ((status == 3)) && [[ -e $base.h5 && $(last_words "${names[$1]}") == *"$is_finished"* ]]; then
     touch -- "$base.h5" && status=0
@@ -210,8 +210,8 @@ run_member() {
   printf '%s %s\n' "$1" "$status" >&"$events"
 }
 
-# Reports that a member run was killed, given its exit status and the message about earlier attempts. After three such ends it is
-# not started again, because it probably needs more memory or time.
+# Reports that a member run was killed, given its exit status and the message about earlier attempts. A member run that was
+# killed three times is not started again, because it probably needs more memory or time.
 tell_kill() {
   local how='' given_up=''
   [[ $1 != 137 ]] || how=' (out of memory?)'
@@ -258,8 +258,8 @@ clock() {
   fi
 }
 
-# tell MEMBER TEXT: prints a line about a member run, with its name, the time and the host, if this script executes only a share
-# of the member runs. Each share may be executed on another computer or at another time.
+# tell MEMBER TEXT: prints a line about a member run, with its name, the time and the host. A line is printed only if this
+# script executes a share of the member runs. Each share may be executed on another computer or at another time.
 tell() {
   [[ -z $task ]] || printf '%(%FT%T%z)T %s %s %s: %s\n' -1 "$task" "$host" "$1" "$2" >&2
 }
@@ -332,8 +332,8 @@ failure() {
   tell "$1" "failed$2: ${3:-no message in its log}"
 }
 
-# announce TEXT: prints TEXT with a summary of all member runs, unless the script executes only a share of them, for each of which
-# a line has been printed already.
+# announce TEXT: prints TEXT with a summary of all member runs. If the script executes only a share of them, nothing is printed,
+# because a line about each member run has already been printed.
 announce() {
   [[ -z $share ]] || return 0
   printf '%s: %s%d of %d members finished' "$folder" "$1" "$finished" "$total" >&2

@@ -92,8 +92,8 @@ has_failed() {
   [[ ! $last_line =~ $goes_on ]]
 }
 
-# Opens the log file of a member run for appending, and stores its file descriptor in `lock`. Fails unless the log is an ordinary
-# file with a single hard link that has not been replaced since it was opened.
+# Opens the log file of a member run for appending, and stores its file descriptor in `lock`. Fails unless the log is an
+# ordinary file with a single hard link. Also fails if the log was replaced after it was opened.
 open_log() {
   may_be_ours "$1" && { exec {lock}>>"$1"; } 2>/dev/null || return
   [[ ! -L $1 && $1 -ef /dev/fd/$lock && $(stat -L -c %h "/dev/fd/$lock") == 1 ]] && return
@@ -109,8 +109,8 @@ forget_failure() {
   exec {lock}>&-
 }
 
-# Checks that the settings of the member runs agree with those of member runs of the same names from earlier commands in this
-# folder, because a result is identified only by the name of its member run.
+# Checks that no earlier command in this folder used the same names of member runs with other settings, because a result is
+# identified only by the name of its member run.
 remember() {
   local line name k door='' changed='' mended='' extended=() found=()
   local -A before=() linked=()
@@ -160,7 +160,7 @@ remember() {
   for name in "${found[@]}"; do
     [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -- "$folder/$name.h5"
   done
-  # While a .part file exists, the modification time of the output file is preserved, because the program that is extending it
+  # While a .part file exists, the modification time of the output file is preserved, because the program that extends this file
   # identifies it by this time.
   for name in "${extended[@]}"; do
     [[ ! -e $folder/$name.h5 || -e $folder/$name.h5.part ]] || touch -d @1 -- "$folder/$name.h5"

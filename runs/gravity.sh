@@ -4,7 +4,8 @@
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 units=(--units "length=m,time=s,mass=kg,energy=J") # of input/gravity.nml
 
-# Task 1: total energy in event-driven and time-stepped simulations, and the fraction of collisions missed by the latter.
+# Task 1: total energy in event-driven and time-stepped simulations, and the fraction of collisions missed by time-stepped
+# simulations.
 runs/ensemble.sh input/gravity.nml -d "$data/events" --seeds 1 "$@"
 runs/ensemble.sh input/gravity_steps.nml -d "$data/steps" --scan run.dt=0.004,0.002,0.001 "$@"
 "$python" post/energy.py "$data/events/seed_1.h5" "$data"/steps/dt_*.h5 "${units[@]}" \
