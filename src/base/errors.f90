@@ -14,7 +14,7 @@ module errors
   !> Exit status of an aborted simulation: events no longer advanced the time, disks overlapped, or
   !> a number became NaN.
   integer, parameter :: exit_broken = 4
-  !> Exit status of a run that wrote a checkpoint and stopped, at a signal or at its wall-clock
+  !> Exit status of a run that wrote a checkpoint and stopped because of a signal or its wall-clock
   !> limit.
   integer, parameter :: exit_stopped = 75
 

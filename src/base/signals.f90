@@ -14,8 +14,8 @@ module signals
   interface
     !> Installs the signal handler. TERM, INT, HUP and XCPU request a stop with a checkpoint; USR1
     !> requests a checkpoint. Signals that were already ignored when the program started (by nohup,
-    !> for example) remain ignored. XFSZ is ignored, so that exceeding the limit of the file size
-    !> makes the write fail instead of killing the program.
+    !> for example) remain ignored. XFSZ is ignored. A write beyond the limit of the file size then
+    !> fails, but the program is not killed.
     subroutine watch_signals() bind(C, name="system_watch_signals")
     end subroutine watch_signals
 

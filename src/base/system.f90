@@ -274,7 +274,7 @@ contains
   end subroutine read_bytes
 
   !> Reads a whole regular file. A Fortran `read` statement may report success without reading any
-  !> bytes, which would cause an infinite loop.
+  !> bytes. This would cause an infinite loop.
   subroutine read_file(path, text, problem)
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text

@@ -9,7 +9,7 @@ module team
   public :: barrier_t, close_barrier, is_last_at, join, open_barrier, release
 
   !> Minimum number of iterations of a loop that is divided among threads. The barrier at the end of
-  !> such a loop costs microseconds, or milliseconds if other programs use the cores.
+  !> such a loop costs microseconds. It costs milliseconds if other programs use the cores.
   integer, parameter :: many = 50000
 
   !> Thread barrier. A barrier in use must not be copied.
@@ -32,7 +32,7 @@ module team
     end subroutine join
 
     !> Registers the arrival of the calling thread at the barrier. The last thread to arrive returns
-    !> with .true. and does not wait: it performs the serial step and then calls `release`. Until
+    !> with .true. and does not wait. It performs the serial step and then calls `release`. Until
     !> then the other threads wait in `arrive`.
     function is_last_at(barrier) result(yes) bind(C, name="barrier_arrive")
       import :: barrier_t, c_bool
