@@ -3,8 +3,9 @@
 !> are divided into spans of many windows, each with an unordered list of events.
 !>
 !> New entries are appended at the end, which accesses few cache lines. Entries of a particular disk
-!> are never searched for, and entries are never removed singly. All lists share one array, divided
-!> into chunks; the chunks of a list are reused once its span has been processed.
+!> are never searched for, and entries are never removed singly. All lists share one array, which is
+!> divided into chunks. The chunks of a list are reused once the span of the list has been
+!> processed.
 module calendar
   use kinds, only: int32, real64
   use disks, only: tag_t
@@ -156,7 +157,7 @@ contains
   !> Appends a chunk to the list whose last entry is just before the position `place`.
   subroutine add_chunk(self, place)
     class(calendar_t), intent(inout) :: self
-    !> On entry, the position after the last entry of the list; on return, the position of the first
+    !> On entry, the position after the last entry of the list. On return, the position of the first
     !> entry in the new chunk.
     integer(int32), intent(inout) :: place
     type(filed_t), allocatable :: more(:)

@@ -31,7 +31,7 @@ contains
     if (sound) call check_cover(fields, "region", source%region, box)
   end subroutine check_source
 
-  !> Time when source s acts next; the result is `never` if no disk of the species is waiting, or if
+  !> Time when source s acts next. The result is `never` if no disk of the species is waiting, or if
   !> the source ends earlier.
   pure function entry_time(sim, s) result(t)
     type(simulation_t), intent(in) :: sim

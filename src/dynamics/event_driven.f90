@@ -174,8 +174,8 @@ contains
         call follow_piston(self, sim)
         cycle
       end if
-      ! The returned event must not be stale, because the stale events depend on the order of the
-      ! predictions.
+      ! The returned event must not be stale, because the order of the predictions determines which
+      ! events are stale.
       if (is_stale()) then
         call predict(self, sim, event%disk)
         cycle

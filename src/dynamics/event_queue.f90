@@ -24,7 +24,7 @@ module event_queue
     private
     type(calendar_t) :: calendar
     type(event_heap_t) :: heap
-    !> Sorted list of events, the latest first; element 0 is a sentinel that is never due; indices
+    !> Sorted list of events, the latest first. Element 0 is a sentinel that is never due. Indices
     !> 0:n_near.
     type(event_t) :: near(0:near_capacity)
     integer(int32) :: n_near = 0
@@ -50,7 +50,7 @@ module event_queue
     procedure :: drop_if_next
     procedure :: list_coming
     ! Rarely called procedures are type-bound, so that the compiler does not inline them into
-    ! frequently called ones.
+    ! frequently called procedures.
     procedure, private :: insert_near
     procedure, private :: insert_into_heap
     procedure, private :: first_in_heap
@@ -330,7 +330,7 @@ contains
 
   !> Moves the valid events of a bucket to a sorted list. An entry is invalid if the event stored by
   !> its disk is due in a later window. The position of an event in the list is the number of later
-  !> events. Counting the later events needs no branches that depend on the times, and is fast for
+  !> events. Counting the later events needs no branches that depend on the times. It is fast for
   !> the few events of a bucket.
   pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket

@@ -39,8 +39,8 @@ module evolution
     !> Allowed iterations not used by the last call of `advance`.
     integer(int64) :: iterations_left = 0
     integer(int64) :: serial_events = 0    !! events executed by the serial engine of a parallel run
-    !> Disk and partner of the last executed event or, at the time limit, of the first event after
-    !> the limit.
+    !> Disk and partner of the last executed event. At the time limit, disk and partner of the first
+    !> event after the limit.
     integer(int32) :: last_event(2) = 0
   contains
     procedure :: warning
@@ -86,10 +86,10 @@ contains
     if (self%disks_inside >= 0) yes = yes .or. tally%has_at_most(self%disks_inside)
   end function reached
 
-  !> True if a quantity that can change in any collision, such as the dissipated energy, has reached
-  !> its limit. Such a quantity must never decrease during a run. A parallel run detects only at the
-  !> end of a time window that a limit was exceeded. It then repeats the window to find the
-  !> collision at which the limit was reached.
+  !> True if a quantity such as the dissipated energy, which can change in any collision, has
+  !> reached its limit. Such a quantity must never decrease during a run. A parallel run detects
+  !> only at the end of a time window that a limit was exceeded. It then repeats the window to find
+  !> the collision at which the limit was reached.
   pure function outgrown(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
@@ -98,8 +98,8 @@ contains
     yes = tally%total(dissipated) >= self%dissipated
   end function outgrown
 
-  !> True if the run limits a quantity that can change in any collision, such as the dissipated
-  !> energy.
+  !> True if the run limits a quantity such as the dissipated energy, which can change in any
+  !> collision.
   pure function watches(self) result(yes)
     class(limits_t), intent(in) :: self
     logical :: yes

@@ -151,8 +151,8 @@ contains
     end do
   end function relative_energy
 
-  !> Completed fraction of the run, from 0 to 1: the maximum over all stop rules of the present
-  !> value divided by the limit.
+  !> Completed fraction of the run, from 0 to 1. For each stop rule, the present value is divided by
+  !> the limit; the result is the maximum of these ratios.
   pure function share(self, sim, elapsed) result(done)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

@@ -127,8 +127,8 @@ contains
       end if
     end subroutine wait
 
-    !> Starts the next epoch, unless the disks are crushed or events no longer advance the time;
-    !> this is reported.
+    !> Starts the next epoch. If the disks are crushed or events no longer advance the time, this is
+    !> reported instead.
     subroutine end_epoch()
       if (are_crushed(sim)) then
         call fail(error, exit_broken, "side.end_time: the side crushes the disks, whose energy has grown a million times; " &
@@ -152,8 +152,8 @@ contains
     call fail(error, exit_broken, standstill(sim, last(1), last(2)))
   end subroutine fail_at_standstill
 
-  !> When a run has reached its number of events or collisions, reports whether time would stop
-  !> advancing if the run continued. Time stops if all disks are at rest or one disk rests on a
+  !> Called when a run has reached its number of events or collisions. Reports whether time would
+  !> stop advancing if the run continued. Time stops if all disks are at rest or one disk rests on a
   !> side. The report depends on the state alone, because a run resumed at its limit predicts no
   !> events.
   subroutine report_rest(sim, limits, error)
