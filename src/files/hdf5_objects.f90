@@ -128,8 +128,8 @@ contains
     if (status >= 0) call h5dget_space_f(dataset, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
     call h5sget_simple_extent_npoints_f(space, n, closed)
-    ! For a dataset without values, HDF5 reports a failure when asked for the number of values or
-    ! the storage size.
+    ! If a dataset contains no values, HDF5 reports a failure for a request of the number of values
+    ! or the storage size.
     if (closed < 0) n = 0
     if (status >= 0) call h5sget_simple_extent_dims_f(space, shape, most, status)
     call h5sclose_f(space, closed)

@@ -20,9 +20,9 @@ module hdf5_series
   integer, parameter :: bytes_of(4) = [8, 4, 4, 8]
   integer(int64), parameter :: copied_at_once = 1048576     !! buffer size for copying [bytes]
 
-  !> One series. Once its name, storage type and shape are set, the series is created in a new file
-  !> or located in an existing file. The dataset then stays open until `close`, or until its file is
-  !> closed.
+  !> One series. The caller sets the name, storage type and shape. The series is then created in a
+  !> new file or located in an existing file. The dataset then stays open until `close`, or until
+  !> its file is closed.
   type :: series_t
     character(len=96) :: name = ""                !! path of the dataset
     integer :: storage = double_precision

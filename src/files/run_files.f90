@@ -1,6 +1,6 @@
 !> Names of the files of a run, derived from the path of its output OUT.h5, and rules for replacing
-!> and deleting these files. Only files written by a run may be replaced or deleted; files that
-!> contain results require `--force`.
+!> and deleting these files. Only files written by a run may be replaced or deleted. For files that
+!> contain results, `--force` is required.
 module run_files
   use errors, only: error_t, exit_files, exit_usage, fail
   use kinds, only: int64
