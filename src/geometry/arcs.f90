@@ -6,8 +6,8 @@
 !> and the last angle of the arc. From inside, a disk larger than the arc can touch only the ends.
 !> The centre of a disk that touches an end lies on a circle about this end. This circle meets the
 !> circles of both faces (the outer and the inner side of the arc) with common tangents. If rounding
-!> errors hide a contact with a face near an end, the contact is therefore found as a contact with
-!> the end.
+!> errors hide a contact with a face near an end, the contact with the end is therefore found
+!> instead.
 module arcs
   use free_flight, only: flight, later_time_to_circle, time_to_circle
   use kinds, only: never, pi, real64

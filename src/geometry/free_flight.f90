@@ -39,9 +39,9 @@ contains
     then = v + g*s
   end function flight_velocity
 
-  !> Time until a point crosses a line in the forward direction; the result is `never` if it does
-  !> not. In each branch, the root of the quadratic equation is calculated by the formula without
-  !> cancellation.
+  !> Time until a point crosses a line in the forward direction; the result is `never` if the point
+  !> does not cross it. In each branch, the root of the quadratic equation is calculated by the
+  !> formula without cancellation.
   pure function time_to_line(distance, speed, acceleration) result(s)
     real(real64), intent(in) :: distance  !! distance to the line; negative behind the point [length]
     real(real64), intent(in) :: speed         !! velocity component towards the line [length/time]
@@ -94,7 +94,7 @@ contains
     if (inside) then
       if (.not. speed2 > 0) return
       ! Inside the circle this form is free of cancellation. If a disk moves along the circle, b and
-      ! c are rounding errors, and the other form of the discriminant can vanish. The contact time,
+      ! c are rounding errors. The other form of the discriminant can then vanish. The contact time,
       ! which is about 0, would then be the ratio of two rounding errors.
       if (c < 0) disc = b*b - speed2*c
       disc = sqrt(max(disc, 0.0_real64))
@@ -155,9 +155,9 @@ contains
     end function is_positive
   end function misses_circle
 
-  !> Version of `time_to_circle` that skips a given number of earlier contacts, at which the point
-  !> passes through the circle. A straight path crosses a circle at most once inwards and once
-  !> outwards.
+  !> Version of `time_to_circle` that skips a given number of earlier contacts. At these contacts
+  !> the point passes through the circle. A straight path crosses a circle at most once inwards and
+  !> once outwards.
   pure function later_time_to_circle(d, v, g, rho, inside, skipped) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside

@@ -121,8 +121,8 @@ contains
   end function displacement
 
   !> Time at which the image above the box will have moved by `distance` from its present position;
-  !> `never` if the images do not move. Until then, the present result of `around` is sufficient for
-  !> a search that allows for displacements of up to `distance`.
+  !> `never` if the images do not move. A search that allows for displacements of up to `distance`
+  !> can use the present result of `around` until then.
   pure function valid_until(self, now, distance) result(t)
     class(images_t), intent(in) :: self
     real(real64), intent(in) :: now             !! [time]

@@ -117,9 +117,9 @@ contains
   end function gap
 
   !> Unit vector from the point of contact on the wall to the centre of the touching disk. Between
-  !> the ends it is exactly the normal of the wall, without rounding errors even for very small
-  !> disks. `heading` matters only at an end of the wall; elsewhere a disk touches the wall at one
-  !> point.
+  !> the ends this vector is exactly the normal of the wall, without rounding errors even for very
+  !> small disks. `heading` matters only at an end of the wall; elsewhere a disk touches the wall at
+  !> one point.
   pure function normal(self, d, heading) result(direction)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
