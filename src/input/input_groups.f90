@@ -14,7 +14,7 @@ module input_groups
   integer, parameter, public :: most_written = 100
 
   !> Value of one variable: an array `reals` for real variables, `texts` for all others. Integers
-  !> are stored as decimal digits, which can represent every 64-bit integer, and logicals as
+  !> are stored as decimal digits, which can represent every 64-bit integer. Logicals are stored as
   !> `.true.` or `.false.`. For a variable without a value, neither array is allocated.
   type :: value_t
     integer :: row = 0                         !! row of the variable in the table of variables

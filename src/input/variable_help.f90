@@ -284,7 +284,7 @@ contains
   end function variables_text
 
   !> Converts a row of the table of variables to JSON. The bounds of a number are called `from` and
-  !> `to` if the bounds themselves are allowed, otherwise `above` and `below`.
+  !> `to` if the bounds themselves are allowed. Otherwise they are called `above` and `below`.
   pure function row_text(k) result(text)
     integer, intent(in) :: k                               !! row number in the table of variables
     character(len=:), allocatable :: text, value, meanings
