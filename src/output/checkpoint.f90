@@ -4,7 +4,7 @@
 !> During a run the output file has two slots, each with space for one checkpoint; one of them is
 !> valid. A new checkpoint and its checksum are written to the other slot. Once they are on disk, a
 !> number in the file is changed, which makes this slot the valid one. The file therefore always
-!> contains a complete checkpoint. The output of a finished run has one slot; the output of an
+!> contains a complete checkpoint. The output of a finished run has one slot. The output of an
 !> aborted run contains no valid checkpoint.
 module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8

@@ -480,7 +480,7 @@ contains
   end subroutine finish
 
   !> Writes the last samples, removes unused space, and records why the run ended. Samples taken
-  !> only because the run ends are not counted in the final checkpoint, so that a continued run
+  !> only because the run ends are not counted in the final checkpoint. A continued run therefore
   !> overwrites them.
   subroutine write_end(self, sim, cost, note, broken)
     class(output_t), intent(inout) :: self

@@ -103,8 +103,8 @@ contains
   end subroutine take
 
   !> Determines the time and the numbers of collisions and events at which the next samples are due.
-  !> A sample is due at the present time only if no sample has been taken at this time and further
-  !> events can occur.
+  !> A sample is due at the present time only if further events can occur and no sample has been
+  !> taken at this time.
   elemental subroutine look_ahead(self, sim)
     class(schedule_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

@@ -174,8 +174,8 @@ contains
       call exchange_short(file, record, tag%id)
       call record%exchange(file, tag%collisions)
       call exchange_short(file, record, tag%last_partner)
-      ! Without individual masses and radii, the radii are not stored, because the input contains
-      ! the radius of each species.
+      ! Without individual masses and radii, no radii are stored, because the input contains the
+      ! radius of each species.
       if (sim%features%own_sizes) call record%exchange(file, disk%radius)
     end associate
     settled = merge(1, 0, sim%events_done)
