@@ -107,7 +107,7 @@ contains
   end subroutine drop_history
 
   !> True if this domain counts a collision of disk i. A disk-disk collision is counted by the owner
-  !> of the disk with the lower id, any other collision by the owner of disk i.
+  !> of the disk with the lower id. Any other collision is counted by the owner of disk i.
   pure function counts(self, tag, i, code) result(yes)
     class(histories_t), intent(in) :: self
     type(tag_t), intent(in) :: tag(:)
@@ -174,7 +174,7 @@ contains
     end associate
   end subroutine record_cell
 
-  !> Records that an owned disk is in a cell outside the domain, where it can touch any disk in the
+  !> Records that an owned disk is in a cell outside the domain. There it can touch any disk in the
   !> 3 x 3 cells around it.
   subroutine reach(self, cell)
     class(histories_t), intent(inout) :: self

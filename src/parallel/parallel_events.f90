@@ -84,7 +84,7 @@ contains
   end subroutine start
 
   !> Updates the predicted events after changes of disks. The serial engine predicts the events of
-  !> these disks anew; domains cannot do this and are loaded again.
+  !> these disks anew. Domains cannot do this and are loaded again.
   subroutine renew(self, sim, changed)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

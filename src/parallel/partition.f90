@@ -214,7 +214,7 @@ contains
     real(real64) :: length
 
     length = self%window*self%shortening*sim%n_disks()/(2*self%event_rate)
-    ! With more domains than threads, each domain is loaded into the cache once per window; longer
+    ! With more domains than threads, each domain is loaded into the cache once per window. Longer
     ! windows need fewer such loads.
     if (self%wanted > self%threads) length = 2*length
     plan%windows = plan%windows + 1
@@ -229,8 +229,8 @@ contains
 
   !> Chooses the time to which all domains advance next. This is the end of the window, unless the
   !> number of events or collisions would exceed its limit earlier. Near a limit the domains first
-  !> execute most of the remaining events, and finally single events. The limit of iterations bounds
-  !> the work of each engine in case the estimated event rate is wrong.
+  !> execute most of the remaining events together. Finally they execute single events. The limit of
+  !> iterations bounds the work of each engine in case the estimated event rate is wrong.
   subroutine choose_target(self, sim, limits, plan)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
