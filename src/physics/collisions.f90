@@ -12,8 +12,8 @@ module collisions
   !> program a rule is represented by its index in this list.
   character(len=*), parameter :: wall_rules = "velocity normal"
   integer, parameter :: normal_rule = 2              !! index of the rule 'normal'
-  !> Meanings of the rules: of the variable `rule` of a single wall, and of the variable `wall_rule`
-  !> of all walls.
+  !> Meanings of the rules. They apply to the variable `rule` of a single wall and to the variable
+  !> `wall_rule` of all walls.
   type(choice_t), parameter :: meanings(*) = [ &
     choice_t("", "velocity", "Both components of the velocity are multiplied by the coefficient of restitution, and the " &
       //"normal component is reversed. A single disk without gravity follows the same path as in elastic collisions, at " &
@@ -145,9 +145,9 @@ contains
     yes = self%c < 0 .and. self%speed > 0
   end function has_elastic_range
 
-  !> Impulse on disk i, as a multiple q of the separation vector dx = x_j - x_i: v_i changes by q
-  !> dx/m_i, and v_j by -q dx/m_j. The actual distance of the disks is used instead of the sum of
-  !> their radii. Energy is then conserved up to rounding errors.
+  !> Impulse on disk i, as a multiple q of the separation vector dx = x_j - x_i. The velocity v_i
+  !> changes by q dx/m_i, and v_j changes by -q dx/m_j. The actual distance of the disks is used
+  !> instead of the sum of their radii. Energy is then conserved up to rounding errors.
   pure function pair_impulse(b, distance2, mass_i, mass_j, restitution) result(q)
     real(real64), intent(in) :: b                    !! dx . dv [length**2/time]
     real(real64), intent(in) :: distance2            !! dx . dx [length**2]

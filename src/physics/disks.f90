@@ -1,7 +1,7 @@
 !> Data of the disks, grouped by frequency of use. The record of a disk fills one cache line and is
 !> read in every prediction. The tag of a disk fills half a cache line and is read only in events of
 !> the disk itself. Arrays of optional data exist only in some simulations. Derived data are not
-!> stored in checkpoints; they are recomputed whenever a run starts or resumes.
+!> stored in checkpoints. They are recomputed whenever a run starts or resumes.
 module disks
   use free_flight, only: flight, flight_velocity
   use kinds, only: int16, int32, int64, largest_exact, never, real64
@@ -135,7 +135,7 @@ contains
 
   !> Number of the first multiple of the interval that is after a given time and between the start
   !> and the end of the source; 0 if there is none. A multiple within a few rounding errors of the
-  !> start or the end counts as inside (3 x 0.1 > 0.3 in double precision).
+  !> start or the end counts as inside: in double precision, 3 x 0.1 exceeds 0.3.
   pure function next_multiple(self, after) result(k)
     class(source_t), intent(in) :: self
     real(real64), intent(in) :: after             !! since the start of the run [time]

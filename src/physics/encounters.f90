@@ -392,8 +392,8 @@ contains
   end function is_passage
 
   !> Lets disk i leave the box through an open side at the time t. The departure is an event but not
-  !> a collision. If disk i becomes the first waiting disk of a source, the source does not make up
-  !> for the intervals before the departure.
+  !> a collision. If disk i becomes the first waiting disk of a source, the source ignores the
+  !> multiples of its interval before the departure.
   subroutine depart(sim, i, code, t, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -458,8 +458,8 @@ contains
   end subroutine pass_side
 
   !> Moves disk i across the lower or upper boundary of a sheared box (Lees-Edwards). The position
-  !> is shifted by the displacement of the periodic image, and the velocity by the velocity of the
-  !> image. Only the reference frame changes; no force acts on the disk.
+  !> is shifted by the displacement of the periodic image. The velocity is shifted by the velocity
+  !> of the image. Only the reference frame changes; no force acts on the disk.
   subroutine pass_sheared_boundary(sim, i, rows, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i

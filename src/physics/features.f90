@@ -1,6 +1,6 @@
-!> Optional features of a run. Without them, the motion consists of free flight and of collisions
-!> that change only velocities. The features determine which per-disk data and observables are
-!> available, which collision procedure is used, and which inputs are rejected.
+!> Optional features of a run. Without these features, the motion consists of free flight and of
+!> collisions that change only velocities. The features determine which per-disk data and
+!> observables are available, which collision procedure is used, and which inputs are rejected.
 module features
   implicit none
   private
@@ -25,8 +25,7 @@ module features
 
 contains
 
-  !> Adds the features of another system of the same run, as far as they determine data and
-  !> observables.
+  !> Adds those features of another system of the same run that determine data and observables.
   pure subroutine unite(self, other)
     class(features_t), intent(inout) :: self
     type(features_t), intent(in) :: other

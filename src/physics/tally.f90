@@ -138,8 +138,8 @@ contains
   end function total
 
   !> Records the numbers of collisions and disks of a series of simultaneous collisions. Only the
-  !> longest series is recorded, and only if it is longer than any finite series in a row of as many
-  !> equal disks.
+  !> longest series is recorded. It must be longer than any finite series in a row of as many equal
+  !> disks.
   pure subroutine note_series(self, collisions, disks)
     class(tally_t), intent(inout) :: self
     integer(int64), intent(in) :: collisions

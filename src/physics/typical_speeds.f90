@@ -35,8 +35,8 @@ contains
     speed = sqrt(max(maxval([0.0_real64, kick_speed2(self)]), source_speed2(self)))
   end function fastest_drive
 
-  !> Mean square of the velocities set or added by a kick, for the disks of each species; 0 for
-  !> species without driving.
+  !> Mean square of the velocities set or added by a kick, for the disks of each species. For
+  !> species without driving, the result is 0.
   pure function kick_speed2(self) result(speed2)
     class(simulation_t), intent(in) :: self
     real(real64) :: speed2(size(self%species))    !! [(length/time)**2]
