@@ -132,8 +132,8 @@ contains
   !> Estimates the mean displacement of a disk in a chain. In equilibrium, this displacement is pi/4
   !> diameters divided by Z - 1 (Michel, Kapfer and Krauth, 2014, doi:10.1063/1.4863991). Here pi/4
   !> diameters is the mean distance between successive disks of a chain along its direction, and Z
-  !> is the compressibility factor. For Z - 1 the larger of two estimates is used, from scaled
-  !> particle theory and from the free volume of a crystal.
+  !> is the compressibility factor. Z - 1 is estimated from scaled particle theory and from the free
+  !> volume of a crystal, and the larger estimate is used.
   pure function mean_step(box, radius) result(step)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: radius(:)

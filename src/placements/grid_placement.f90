@@ -1,4 +1,4 @@
-!> Placement on a rectangular grid: the disks are at the centres of equal cells of the region, row
+!> Placement on a rectangular grid. The disks are at the centres of equal cells of the region, row
 !> by row from the bottom.
 module grid_placement
   use fields, only: fields_t

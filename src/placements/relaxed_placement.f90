@@ -61,8 +61,8 @@ contains
   end function moves_all_disks
 
   !> See `placement`. Event chains require a box without obstacles and moving sides. Event chains
-  !> sample the uniform distribution of positions, which is the equilibrium distribution only
-  !> without gravity.
+  !> sample the uniform distribution of positions. Only without gravity, this is the equilibrium
+  !> distribution.
   pure function conflict(self, variable) result(reason)
     class(relaxed_placement_t), intent(in) :: self
     character(len=*), intent(in) :: variable
