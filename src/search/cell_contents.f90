@@ -219,9 +219,9 @@ contains
   end function slots_before
 
   !> Lists the disks in the slots of cell c and its eight neighbours, except disk i, which is in
-  !> cell c. All slots are copied, occupied or vacant, to avoid branches that depend on the number
-  !> of disks. If disk i is in the linked list of a crowded cell, the first disk of this list is
-  !> left out instead of disk i.
+  !> cell c. All slots are copied, whether they are occupied or vacant, to avoid branches that
+  !> depend on the number of disks. If disk i is in the linked list of a crowded cell, the first
+  !> disk of this list is left out instead of disk i.
   subroutine gather(cell, c, stride, i, list, n)
     type(cell_t), intent(in) :: cell(0:*)
     integer(int32), intent(in) :: c, stride, i

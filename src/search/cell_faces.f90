@@ -218,8 +218,8 @@ contains
     step = int(chosen(0_int32, 2*up - 1, left < overlap .and. .not. is_wall(line(up, cell)%code)), int16)
   end function ahead
 
-  !> Selects `second` if the condition is true, otherwise `first`, without a branch, which would
-  !> often be mispredicted.
+  !> Selects `second` if the condition is true, otherwise `first`. No branch is used, because it
+  !> would often be mispredicted.
   elemental function chosen(first, second, condition) result(n)
     integer(int32), intent(in) :: first, second
     logical, intent(in) :: condition

@@ -157,8 +157,8 @@ contains
     yes = any(cell == self%last .or. cell == self%next)
   end function at_seam
 
-  !> Finds the column or row `ahead` steps away from a given one, and the number of periodic sides
-  !> between them.
+  !> Finds the column or row that is `ahead` steps away from a given column or row, and the number
+  !> of periodic sides between them.
   pure subroutine step(self, axis, cell, ahead, there, periods)
     class(cell_layout_t), intent(in) :: self
     integer, intent(in) :: axis

@@ -73,8 +73,8 @@ module clusters
 
 contains
 
-  !> Follows the collisions of a cluster until they end, the time limit is reached, or their number
-  !> is known to be unbounded.
+  !> Follows the collisions of a cluster. Ends when no more collisions occur, the time limit is
+  !> reached, or the number of collisions is known to be unbounded.
   pure subroutine follow(self, limit, endless, duration, events)
     class(cluster_t), intent(inout) :: self
     real(real64), intent(in) :: limit                !! [time]

@@ -32,8 +32,8 @@ module neighbour_lists
 
   !> Values in place of the number of entries of a list.
   integer(int32), parameter :: unlisted = -2, incomplete = -1
-  !> Number of array elements copied from every list, even if it is shorter: copying a fixed number
-  !> needs no branch.
+  !> Number of array elements copied from every list, even if the list is shorter. Copying a fixed
+  !> number needs no branch.
   integer(int32), parameter :: always_copied = 15
   !> Factor of the image index in a list entry; larger than the index of any disk.
   integer(int32), parameter :: image_unit = 2**27

@@ -189,8 +189,8 @@ contains
     integer, intent(in) :: axis                     !! 1 for x, 2 for y
     !> 1 for a motion to the right or upwards, -1 for the opposite direction.
     integer, intent(in) :: sense
-    !> On entry, the distance up to which to search; on return, the distance to the contact if one
-    !> was found [length].
+    !> On entry, the maximum distance of the search. On return, the distance to the contact if a
+    !> contact was found [length].
     real(real64), intent(inout) :: distance
     integer(int32), intent(out) :: partner          !! touched disk; 0 if there is none
     integer :: s
