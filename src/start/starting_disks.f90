@@ -1,5 +1,5 @@
 !> Reads the disks of one species from an initial-configuration file in any of the supported
-!> formats. All numbers in the file are checked; quantities missing from the file are taken from the
+!> formats. All numbers in the file are checked. Quantities missing from the file are taken from the
 !> input.
 module starting_disks
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite

@@ -140,7 +140,7 @@ contains
 
   !> Sets the total momentum of all generated velocities to zero, by subtracting a constant velocity
   !> from all 'uniform' and 'maxwell' disks. The momenta of an 'equal_speed' species already add up
-  !> to zero, unless it consists of a single disk.
+  !> to zero, unless the species consists of a single disk.
   subroutine remove_drift(self, species, sim)
     class(drawing_t), intent(in) :: self
     type(species_settings_t), intent(in) :: species(:)
