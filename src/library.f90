@@ -289,7 +289,7 @@ contains
   end subroutine take_schedule
 
   !> Reports an obstacle file or initial-configuration file that has changed since the simulation
-  !> was created. Each change and each save reads the input again. With a changed file, obstacles
+  !> was created. Each change and each save reads the input again. If a file has changed, obstacles
   !> would jump in the running simulation, and the saved file would describe different disks.
   subroutine check_files(groups, again, error)
     type(group_t), intent(in) :: groups(:)            !! groups of the input of the simulation

@@ -102,8 +102,8 @@ contains
 
   !> Determines the number of threads from the input or the environment; the default is one.
   subroutine ask(threads, name)
-    !> On entry, the number of threads in the input, or 0 if it is not set; on return, the number to
-    !> be used.
+    !> On entry, the number of threads in the input, or 0 if it is not set. On return, the number of
+    !> threads to be used.
     integer, intent(inout) :: threads
     character(len=:), allocatable, intent(out) :: name
     character(len=16) :: value
