@@ -18,7 +18,7 @@ module input_text
   character(len=1), parameter :: control(*) = [(achar(i), i=0, 8), achar(11), achar(12), (achar(i), i=14, 31), achar(127)]
 
   !> First bytes of an HDF5 file (HDF5 File Format Specification, section II.A)
-  character(len=*), parameter :: hdf5_signature = achar(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
+  character(len=*), parameter :: hdf5_signature = char(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
 
   !> Kinds of tokens. A single character such as & or = forms its own kind. The kind of a quoted
   !> string is its quotation mark.
