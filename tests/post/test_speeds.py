@@ -203,3 +203,18 @@ def test_mixture_has_the_means_of_maxwell(tmp_path, rng):
         bins = mixture.speed_bins(np.full(5, speed), top)
         one = np.searchsorted(bins, speed)
         assert bins[one - 1 : one + 1].mean() == pytest.approx(speed) and bins[-1] >= top
+
+
+@pytest.mark.parametrize("hot", [1.0, 9.0])
+def test_a_temperature_that_varies_in_space_is_said(tmp_path, rng, capsys, hot):
+    """A thermal wall heats an inelastic gas, whose left half is `hot` times as hot."""
+    parameters = {"contact": {"restitution": 0.9}, "side/left": {"temperature": 1.0}}
+    more = {"periodic": (False, True), "observable_time": np.arange(121.0)}
+    path = gas(tmp_path / "a.h5", rng, count=1000, frames=121, parameters=parameters, **more)
+    with h5py.File(path, "r+") as file:
+        velocity, x = (file[f"particles/disks/{name}/value"] for name in ("velocity", "position"))
+        left = x[..., :1] < np.median(x[..., 0])
+        velocity[...] = velocity[...] * np.where(left, np.sqrt(hot), 1)
+    drawn(tmp_path, "speeds", path, "--equilibration", 20)
+    said = capsys.readouterr().err
+    assert ("kT varies in space by a factor of" in said) == (hot > 1), said

@@ -17,6 +17,8 @@ __all__ = [
     "reduced_speeds",
 ]
 
+ENOUGH = 400  # speeds from which a local temperature is calculated
+
 
 def kt_of_frames(
     run: Run, frames: Index, species: str | None = None, component: int | None = None
@@ -99,6 +101,17 @@ def all_move(run: Run, frame: int) -> bool:
     """Return whether at least one disk of each species moves in a frame."""
     energy = run.kinetic_energy(frame)
     return all(energy[kind.disks].any() for kind in run.by_species)
+
+
+def kt_in_strips(run: Run, frames: list[int], axis: int, strips: int) -> np.ndarray:
+    """Return kT (strips,) in strips of equal width across an axis, NaN where few disks are."""
+    place = (run.position[frames][..., axis] - run.lower[axis]) / run.edges[axis]
+    strip = np.clip((strips * place).astype(int), 0, strips - 1)
+    energy = thermal_energy(run, frames)
+    count, total = (
+        np.bincount(strip.ravel(), weights, strips) for weights in (None, energy.ravel())
+    )
+    return np.where(count >= ENOUGH, total / np.maximum(count, 1), np.nan)
 
 
 def relaxation(

@@ -9,7 +9,14 @@ import numpy as np
 from ...analysis.equilibrium import motion_notes, refuse_others
 from ...analysis.estimates import Estimate, binned, estimate, rounded_to_error
 from ...analysis.speed_laws import speed_test
-from ...analysis.speeds import all_move, kt_of_frames, moment, reduced_speeds, relaxation
+from ...analysis.speeds import (
+    all_move,
+    kt_in_strips,
+    kt_of_frames,
+    moment,
+    reduced_speeds,
+    relaxation,
+)
 from ...analysis.statistics import SeriesMean, combine_runs, correlated_mean, has_drift, has_trend
 from ...figures.drawing import bars, caption, colours, dilute_limit, noise_band, plt
 from ...figures.sheet import Panel, Sheet, legend_above
@@ -25,6 +32,7 @@ from ..tables import measured
 BINS = np.linspace(0, 3, 51)  # u = 1 is at the centre of a bin
 WIDE_BINS = np.linspace(0, 3.06, 18)  # for a histogram of up to `FEW_SPEEDS` speeds
 FEW_SPEEDS = 300
+STRIPS, UNEQUAL = 10, 1.5  # strips across a box between walls; ratio of their kT for a warning
 # Titles of the panel of late frames (after the initial relaxation), by the state of the gas.
 # `EQUILIBRIUM` and `STEADY` are used if the mean kT does not change in the late frames.
 EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
@@ -292,6 +300,22 @@ def common_state(runs: list[Run]) -> str:
     return state
 
 
+def unequal_places(runs: list[Run], picked: list[list[int]]) -> list[str]:
+    """Return a warning if kT varies in space between walls that heat or cool the disks."""
+    factors = [1.0]
+    for run, frames in zip(runs, picked, strict=True):
+        for axis in np.flatnonzero(~run.periodic) if "open" not in run.nature else ():
+            kt = kt_in_strips(run, frames, int(axis), STRIPS)
+            if np.isfinite(kt).any():
+                factors.append(float(np.nanmax(kt) / np.nanmin(kt)))
+    if max(factors) < UNEQUAL:
+        return []
+    return [
+        f"kT varies in space by a factor of {max(factors):.2g}: these are the speeds of disks at "
+        "different temperatures; see fields.py"
+    ]
+
+
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     """Compare the speeds of each species in late frames with the Maxwell distribution."""
     runs = [run for group in groups for run in group.runs]
@@ -299,6 +323,8 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     for group in groups:
         refuse_others(group.runs)
         group.values = [late_frames(run, options, warnings) for run in group.runs]
+        if state == STEADY:
+            warnings += unequal_places(group.runs, group.values)
     found = [temperature(group.runs, group.values) for group in groups]
     if state in (EQUILIBRIUM, STEADY) and any(drift for *_, drift in found):
         state = UNSTEADY
