@@ -206,3 +206,18 @@ def test_the_help_states_which_frames_are_used(capsys):
     assert (
         "are left out [the first half of each run]" in said and "no observable drifts" not in said
     )
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ((), ""),
+        (("contact.restitution=0.9",), "is not elastic"),
+        (("box.boundary='wall','wall'",), "also has walls across y"),
+    ],
+)
+def test_missing_predictions_have_a_reason(simulated, settings, reason):
+    more = ("stop.time=40", *settings)
+    run = simulated(SHEARED.format(speed=0), *more)
+    notes = [note for note in ricochet.analyse("fields", [run], cells=5).notes if "No pred" in note]
+    assert len(notes) == bool(reason) and all(reason in note for note in notes)

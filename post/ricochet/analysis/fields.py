@@ -12,8 +12,8 @@ import numpy as np
 import scipy
 
 from ..predictions import hard_disks
-from ..reading.files import RunError
-from ..reading.nature import Refused
+from ..reading.files import RunError, counted
+from ..reading.nature import TRAITS, Refused
 from ..reading.reader import SIDES, Run
 from .estimates import Estimate, PseudoValues, jackknife_of_sums
 from .statistics import statistical_inefficiency
@@ -76,8 +76,8 @@ def steady_frames(run: Run, skip: float | None) -> list[int]:
     start = run.time[-1] / 2 if skip is None else after_start(run, skip)
     frames = np.flatnonzero(run.time >= start).tolist()
     if len(frames) < FEWEST_BLOCKS:
-        few = f"has {len(frames)} frames in the steady state; at least {FEWEST_BLOCKS} are required"
-        raise RunError(f"{run.path}: {few}")
+        few = f"has {counted(len(frames), 'frame')} in the steady state"
+        raise RunError(f"{run.path}: {few}; at least {FEWEST_BLOCKS} are required")
     return frames
 
 
@@ -448,9 +448,16 @@ def expected(
 
 def has_theory(runs: list[Run], axis: int) -> bool:
     """Return whether Enskog's theory applies: two opposite walls, equal smooth elastic disks."""
-    return all(
-        not run.periodic[axis] and run.periodic[1 - axis] and run.nature <= LAWFUL for run in runs
-    )
+    return not any(no_theory(run, axis) for run in runs)
+
+
+def no_theory(run: Run, axis: int) -> str:
+    """Return why Enskog's theory between two walls does not apply to a run, or "" if it does."""
+    if strange := [text for trait, text in TRAITS.items() if trait in run.nature - LAWFUL]:
+        return strange[0]
+    if run.periodic[axis]:
+        return f"has no walls across {'xy'[axis]}"
+    return "" if run.periodic[1 - axis] else f"also has walls across {'yx'[axis]}"
 
 
 def prediction(

@@ -15,6 +15,7 @@ from ...analysis.fields import (
     Fields,
     fields,
     has_theory,
+    no_theory,
     oscillation_notes,
     places,
     prediction,
@@ -23,7 +24,7 @@ from ...analysis.streams import StreamFunction, stream_function
 from ...figures import drawing
 from ...figures.drawing import band, draw_box, plt, titled
 from ...figures.sheet import Panel, Sheet, legend_above
-from ...reading.files import RunError
+from ...reading.files import RunError, counted
 from ...reading.nature import rows_of
 from ...reading.reader import SIDES, Run
 from ...reading.units import Units
@@ -255,7 +256,7 @@ def draw(result: Result) -> Sheet:
     title = titled(result.runs)
     if name is not None:
         count = np.sum(run.of_species(name))
-        title += f"\nfields of the species '{name}' ({count} disks)"
+        title += f"\nfields of the species '{name}' ({counted(count, 'disk')})"
     if result.options.grid:
         aspect = min(2.5, drawing.aspect_of(run)) + 0.25
         maps = [Panel(one, draw_map, (result, one), aspect) for one in ("density", "temperature")]
@@ -344,15 +345,20 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     printed = {name: one for name, one in data.items() if "stress" not in name and not options.grid}
     values = Found(own, cells, axis, law, stream)
     more = {"further": further, "printed": printed, "values": values}
-    return Result(rows_of(data), notes=notes_of(values, options), warnings=warnings, **more)
+    return Result(rows_of(data), notes=notes_of(runs, values, options), warnings=warnings, **more)
 
 
-def notes_of(found: Found, options: SimpleNamespace) -> list[str]:
+def notes_of(runs: list[Run], found: Found, options: SimpleNamespace) -> list[str]:
     """Return explanations of the figure."""
     if options.grid:
         return ["Arrows: mean flow, pale where it is not significant. Lines: streamlines."]
     note = "Bars: standard errors, jackknife over blocks of time."
-    return [note + " Band: error of the prediction." * (found.law is not None)]
+    notes = [note + " Band: error of the prediction." * (found.law is not None)]
+    reasons = ((run, no_theory(run, found.axis)) for run in runs)
+    if why := next((f"{run.path.name} {why}" for run, why in reasons if why), ""):
+        law = "Enskog's theory of equal smooth elastic disks between two walls does not apply"
+        notes.append(f"No predictions and no fluxes at walls: {law}, because {why}.")
+    return notes
 
 
 ANALYSIS = Analysis(
