@@ -1,6 +1,7 @@
 """Cooling gases: Haff's law for hard and soft disks, and the scripts haff and cooling."""
 
 import csv
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -145,6 +146,15 @@ def test_the_cooling_rate_is_that_of_the_homogeneous_state(rng, end):
     assert known.mean == pytest.approx(end, abs=1 + known.error) if end else np.isnan(known.mean)
     said = " ".join(haff.apart(0.9, curves, until))
     assert not said if end else "here K is 0.8" in said and "after 60 coll" in said
+    found = haff.Cooling(curves, rate, until, known)
+    group = SimpleNamespace(key=Restitution(0.9), runs=tracks, values=found)
+    (note,) = haff.deviation(group)
+    assert "standard errors above the law" in note and "from 20 runs" in note
+    law = cooling.hard_disks.haff_rate(0.9)
+    group.values = found._replace(rate=estimates.Estimate(law - 2 * rate.error, rate.error))
+    assert not haff.deviation(group)
+    group.values = found._replace(rate=estimates.Estimate(law - 4 * rate.error, rate.error))
+    assert "rate 4.0 standard errors below the law" in haff.deviation(group)[0]
 
 
 def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):

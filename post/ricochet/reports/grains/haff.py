@@ -11,12 +11,14 @@ from ...analysis.thermodynamics import packing
 from ...figures.drawing import band, caption, plt
 from ...figures.sheet import Panel, Sheet, legend_above
 from ...predictions.hard_disks import haff_rate
+from ...reading.files import counted
 from ...reading.reader import Restitution
 from ..groups import Group, by_restitution
 from ..registry import Analysis
 from ..result import Result
 from ..tables import measured, spread
 
+FAR = 3.0  # deviation of a rate from its law that a note reports [standard errors]
 RATIO_TOP = 2.0  # largest upper limit of the axis of ratios
 
 
@@ -148,6 +150,20 @@ def apart(xi: Restitution, found: Curves, end: float) -> list[str]:
     return [f"{law}{tau:.3g} collisions per disk"]
 
 
+def deviation(group: Group) -> list[str]:
+    """Return a note if the rate or exponent deviates from its law by more than `FAR` errors."""
+    name, known = expected(group.key, group.values.curves)
+    mean, error = group.values.rate
+    if not error > 0 or abs(mean - known) <= FAR * error:
+        return []
+    side = "below" if mean < known else "above"
+    text = (
+        f"ξ = {group.key:g}: {name} {abs(mean - known) / error:.1f} standard errors {side} the law"
+    )
+    runs = f"from {counted(len(group.runs), 'run')}"
+    return [f"{text}, which neglects correlations of velocities ({runs})."]
+
+
 def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     """Compare energy and cooling rate with Haff's law."""
     for group in groups:
@@ -158,6 +174,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
         "Bands: standard errors of the mean over the runs. In brackets: cooling rate of the law. "
         "Pale: the gas is no longer homogeneous."
     ]
+    notes += [text for group in groups for text in deviation(group)]
     warnings = [
         text for group in groups for text in apart(group.key, group.values.curves, group.values.end)
     ]
