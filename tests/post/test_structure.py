@@ -23,7 +23,9 @@ from ricochet import (
 from ricochet.analysis.structure import largest_cluster
 from ricochet.figures.drawing import values_of
 from ricochet.reading.nature import Refused
+from ricochet.reading.reader import read_run
 from sampling import STATISTICS, held_as_often_as_stated, samples
+from synthetic_gases import gas
 from synthetic_run import run_script, written
 
 PERIODIC = (True, True)
@@ -452,3 +454,25 @@ def test_enskog_is_boltzmann_in_a_dilute_gas():
     viscosity = hd.enskog(1 + 2 * eta, eta, 0.01, kt=2.0, mass=3.0)["viscosity"]
     assert viscosity == pytest.approx(1.022 / 0.02 * np.sqrt(6 / np.pi), rel=1e-3)
     assert hd.long_time_tail(2.0, 5.0, 0.7, 0.3) == pytest.approx(1 / (80 * np.pi))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "periodic", "said"),
+    [
+        ({}, True, None),
+        ({}, False, "no D_displacement, D_velocities (calculated only in a periodic box)."),
+        (
+            {"contact": {"restitution": 0.8}, "drive": {"kind": "noise", "keep_momentum": True}},
+            True,
+            "no D_displacement, D_velocities (calculated only in equilibrium), "
+            "no D_enskog (known only for undriven smooth elastic disks).",
+        ),
+    ],
+)
+def test_missing_diffusion_coefficients_have_a_reason(tmp_path, rng, parameters, periodic, said):
+    path = gas(tmp_path / "a.h5", rng, parameters=parameters, periodic=(periodic, periodic))
+    result = ricochet.analyse("correlations", [read_run(path)], equilibration=1)
+    found = [note for note in result.notes if ": no D" in note]
+    assert [note.partition(": ")[2] for note in found] == ([said] if said else [])
+    row = result.table[0] if isinstance(result.table, list) else result.table.iloc[0]
+    assert (row["D_displacement"] is None) == (said is not None)

@@ -235,6 +235,23 @@ def table(groups: list[Group]) -> tuple[list[dict[str, Any]], list[str]]:
     return rows, warnings
 
 
+def missing(group: Group) -> list[str]:
+    """Return a note that explains which diffusion coefficients are not in the table, if any."""
+    run, reasons = group.runs[0], []
+    names = ", ".join(name for name in DIFFUSION if name not in group.values.members)
+    if not run.nature.in_equilibrium:
+        reasons.append(f"{names} (calculated only in equilibrium)")
+    elif not run.periodic.all():
+        reasons.append(f"{names} (calculated only in a periodic box)")
+    elif names and "thermostatted" in run.nature and "D_displacement" not in names:
+        reasons.append(f"{names} (a heat bath changes velocities between frames)")
+    elif names:
+        reasons.append(f"{names} (calculated only from equally spaced frames)")
+    if not enskog(run):
+        reasons.append("D_enskog (known only for undriven smooth elastic disks)")
+    return [f"η = {group.key:.3g}: no {', no '.join(reasons)}."] if reasons else []
+
+
 def curves(groups: list[Group]) -> list[dict[str, Any]]:
     """Return a table of the numbers with errors, followed by all points of the curves."""
     names, rows = ("what", "packing", "x", "y", "error"), []
@@ -424,6 +441,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
             "no steady state without flow: time correlations and diffusion coefficients are omitted"
         )
     notes = [told(*one) for one in zip(groups, rows, strict=True)]
+    notes += [text for group in groups for text in missing(group)]
     notes.append("Bands: standard errors; pale parts have no error. w: collision rate.")
     return Result(rows, notes=notes, warnings=warnings, data=curves(groups))
 
