@@ -90,7 +90,7 @@ def did_you_mean(word: str, others: Iterable[str]) -> str:
 
 def counted(number: int, noun: str) -> str:
     """Return a number and a noun, in the plural unless the number is 1."""
-    return f"{number} {noun}" + "s" * (number != 1)
+    return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
 def tree(group: h5py.Group) -> dict[str, Any]:

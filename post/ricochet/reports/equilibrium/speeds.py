@@ -306,7 +306,7 @@ def unequal_places(runs: list[Run], picked: list[list[int]]) -> list[str]:
     for run, frames in zip(runs, picked, strict=True):
         for axis in np.flatnonzero(~run.periodic) if "open" not in run.nature else ():
             kt = kt_in_strips(run, frames, int(axis), STRIPS)
-            if np.isfinite(kt).any():
+            if np.nanmin(kt, initial=np.inf) > 0 and np.isfinite(kt).any():
                 factors.append(float(np.nanmax(kt) / np.nanmin(kt)))
     if max(factors) < UNEQUAL:
         return []
