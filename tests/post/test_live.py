@@ -82,7 +82,7 @@ def test_the_show_stops_when_asked_and_the_run_goes_on(live, sign):
     with urllib.request.urlopen(address + "film", timeout=PATIENCE) as reply:
         assert reply.status == 200
     show.send_signal(sign)
-    out, err = show.communicate()
+    out, err = show.communicate(timeout=PATIENCE)
     assert (show.returncode, err, out.strip()) == (0, "", "stopped; the run continues")
     assert run.poll() is None
 
@@ -103,7 +103,7 @@ def test_the_show_ends_with_the_run_and_says_so(live, browser, tmp_path, capsys,
         left = part
         run.send_signal(signal.SIGTERM if how == "has stopped" else signal.SIGKILL)
         run.send_signal(signal.SIGCONT)
-        run.wait()
+        run.wait(PATIENCE)
     out, err = show.communicate(timeout=PATIENCE)
     if "crashed" in how:
         assert (show.returncode, out, err) == (2, "", f"player.py: {part}: the run {how}\n")

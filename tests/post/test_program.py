@@ -19,7 +19,7 @@ import pytest
 import ricochet as package
 from ricochet import ProgramError, program
 from synthetic_run import ROOT
-from whole_runs import STOPPED, USAGE, differences, environment, is_asleep, ran, wait_for
+from whole_runs import PATIENCE, STOPPED, USAGE, differences, environment, is_asleep, ran, wait_for
 
 THIRD = 0.1 / 3
 #: Values of all kinds: repeated groups, strings with quotes, pairs, logicals, arrays of NumPy.
@@ -205,7 +205,8 @@ def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch,
     try:
         wait_for(lambda: (tmp_path / "long.h5.part").exists() and is_asleep(python.pid))
         python.send_signal(number)
-        assert ("KeyboardInterrupt" in python.communicate()[1]) == (number == signal.SIGINT)
+        said = python.communicate(timeout=PATIENCE)[1]
+        assert ("KeyboardInterrupt" in said) == (number == signal.SIGINT)
         wait_for(lambda: not (tmp_path / "long.h5.lock").exists())
     finally:
         python.kill()
