@@ -96,8 +96,7 @@ contains
     end associate
   end subroutine build
 
-  !> Removes each disk from the cell whose number is stored with the disk. Afterwards `all_found` is
-  !> .true. if all cells are empty.
+  !> Removes each disk from its cell; `all_found` is .true. if all cells are empty afterwards.
   subroutine clear_cells(self, sim, all_found)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
