@@ -350,7 +350,7 @@ contains
 
     k = 1 - side
     associate (law => sim%box%surface(k)%law, inwards => -sense_of(side)*sim%disk(i)%v(axis_of(side)))
-      yes = .not. is_passage(sim, side) .and. law%restitution < 1 .and. .not. law%temperature > 0 &
+      yes = .not. is_passage(sim, side) .and. law%is_inelastic() .and. .not. law%temperature > 0 &
         .and. abs(inwards - sim%box%side_velocity(k, sim%now)) <= sim%negligible_time*magnitude(sim%box%gravity)
     end associate
   end function bounces_converge

@@ -307,7 +307,7 @@ contains
         //" radii in a step, so that collisions are missed; better: below "//about(longest_way*radius/speed)
     end if
     if (sim%box%has_gravity() .and. sim%law%contact_time <= self%dt &
-      .and. (any(sim%law%restitution < 1) .or. sim%box%has_lossy_walls())) then
+      .and. (sim%law%is_inelastic() .or. sim%box%has_lossy_walls())) then
       if (text /= "") text = text//"; "
       text = text//"contact.contact_time: inelastic disks sink into each other and the floor unless it " &
         //"is more than run.dt"

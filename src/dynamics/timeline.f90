@@ -325,7 +325,7 @@ contains
     if (code > 0) then
       yes = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species) < 1
     else
-      yes = sim%box%surface(sim%box%surface_of(code))%law%restitution < 1
+      yes = sim%box%surface(sim%box%surface_of(code))%law%is_inelastic()
     end if
   end function may_lose
 

@@ -3,7 +3,10 @@
 module input_settings
   use kinds, only: int64, never, real64
   use box_geometry, only: box_t
-  use collisions, only: contact_law_t, tangential_law_t, restitution_laws, series_terms, wall_law_t, wall_rules
+  use contact_law, only: contact_law_t
+  use restitution_law, only: chosen_restitution_law
+  use tangential_law, only: tangential_law_t
+  use wall_law, only: wall_law_t, wall_rules
   use disks, only: names_of, source_t
   use drives, only: choose_drive
   use group_fields, only: group_fields_t
@@ -49,7 +52,7 @@ contains
     !> .true. if the caller ends the run; `&stop` may then be empty.
     logical, intent(in), optional :: stepped
     logical :: must_end
-    type(wall_law_t) :: wall_law                        ! default contact law of walls, from `&contact`
+    type(wall_law_t) :: all_walls                       ! default contact law of walls, from `&contact`
     integer :: e(2), o(2), s(2), w(2), k
 
     must_end = .true.
@@ -65,8 +68,8 @@ contains
     call take_box(groups(place_of("box", groups%name)), settings%box, problems)
     call take_obstacles(groups(o(1):o(2)), settings%box, problems)
     call take_species(groups(s(1):s(2)), settings%box, settings%run%seed, settings%species, problems)
-    call take_contact(groups(place_of("contact", groups%name)), size(settings%species), settings%law, wall_law, problems)
-    call take_wall_laws(groups(w(1):w(2)), groups(o(1):o(2)), wall_law, settings%box, problems)
+    call take_contact(groups(place_of("contact", groups%name)), size(settings%species), settings%law, all_walls, problems)
+    call take_wall_laws(groups(w(1):w(2)), groups(o(1):o(2)), all_walls, settings%box, problems)
     settings%has_lids = any([(groups(k)%given("open"), k=w(1), w(2))])
     call take_drive(groups(place_of("drive", groups%name)), names_of(settings%species), settings%drive, problems)
     call take_sources(groups(e(1):e(2)), names_of(settings%species), settings%box, settings%source, problems)
@@ -113,29 +116,28 @@ contains
 
   !> Reads the coefficients of restitution for all pairs of species, and the default contact law of
   !> walls.
-  subroutine take_contact(group, n, law, wall_law, problems)
+  subroutine take_contact(group, n, law, all_walls, problems)
     type(group_t), intent(inout) :: group
     integer, intent(in) :: n                            !! number of species
     type(contact_law_t), intent(inout) :: law
-    type(wall_law_t), intent(inout) :: wall_law
+    type(wall_law_t), intent(inout) :: all_walls
     type(problem_list_t), intent(inout) :: problems
     real(real64), allocatable :: pairs(:)
     real(real64) :: restitution
 
     restitution = group%real_of("restitution", 1.0_real64)
-    wall_law%restitution = group%real_of("wall_restitution", restitution)
-    wall_law%rule = place_of(group%text_of("wall_rule"), words_of(wall_rules))
-    law%by_speed%speed = group%real_of("reference_speed", 0.0_real64)
-    law%by_speed%c = series_terms(max(1, place_of(group%text_of("restitution_law"), words_of(restitution_laws))))
-    wall_law%by_speed = law%by_speed
+    all_walls%restitution = group%real_of("wall_restitution", restitution)
+    all_walls%rule = place_of(group%text_of("wall_rule"), words_of(wall_rules))
+    law%by_speed = chosen_restitution_law(group%text_of("restitution_law"), group%real_of("reference_speed", 0.0_real64))
+    all_walls%by_speed = law%by_speed
     call check_least(group, "restitution", law%by_speed, problems)
     call check_least(group, "wall_restitution", law%by_speed, problems)
     call check_least(group, "pair_restitution", law%by_speed, problems)
     call take_grip(group, "", tangential_law_t(), law%tangential, problems)
-    call take_grip(group, "wall_", law%tangential, wall_law%tangential, problems)
+    call take_grip(group, "wall_", law%tangential, all_walls%tangential, problems)
     law%inertia = group%real_of("inertia", 0.5_real64)
     law%contact_time = group%real_of("contact_time", 0.0_real64)
-    call group%put_reals("wall_restitution", [wall_law%restitution])
+    call group%put_reals("wall_restitution", [all_walls%restitution])
     allocate (law%restitution(n, n), source=restitution)
     allocate (pairs, source=group%reals_of("pair_restitution"))
     if (size(pairs) == 0 .or. n == 0) return

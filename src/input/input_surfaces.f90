@@ -4,7 +4,9 @@ module input_surfaces
   use box_geometry, only: box_t
   use box_side, only: side_t
   use circles, only: new_circle
-  use collisions, only: tangential_law_t, normal_rule, speed_law_t, wall_law_t, wall_rules
+  use restitution_law, only: restitution_law_t
+  use tangential_law, only: tangential_law_t
+  use wall_law, only: normal_rule, wall_law_t, wall_rules
   use errors, only: error_t, exit_files
   use input_problems, only: problem_list_t
   use input_species, only: check_name
@@ -285,7 +287,7 @@ contains
   subroutine check_least(group, name, by_speed, problems)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name
-    type(speed_law_t), intent(in) :: by_speed
+    type(restitution_law_t), intent(in) :: by_speed
     type(problem_list_t), intent(inout) :: problems
 
     if (group%given(name) .and. any(group%reals_of(name) < by_speed%least())) call group%complain(name, "must be at least " &

@@ -3,7 +3,8 @@ module boundary_collisions
   use kinds, only: int32, never, real64
   use box_geometry, only: next_obstacle, normal_surface_velocity, tangential_surface_velocity, wall_normal
   use box_sides, only: side_time
-  use collisions, only: tangential_law_t, tangential_impulse, wall_law_t, wall_rebound
+  use tangential_law, only: tangential_impulse, tangential_law_t
+  use wall_law, only: wall_law_t, wall_rebound
   use disks, only: advance_disk
   use partners, only: axis_of, is_side, sense_of
   use random_stream, only: random_stream_t, thermal_walls
@@ -48,10 +49,10 @@ contains
         ! The rounded velocity of the disk is not below the velocity of the side, because rounding
         ! is monotonic.
         sim%disk(i)%v = sim%disk(i)%v + normal_velocity
-        if (law%restitution < 1 .and. .not. elastic) call end_bouncing(sim%disk(i)%v, v, normal_velocity, normal)
+        if (law%is_inelastic() .and. .not. elastic) call end_bouncing(sim%disk(i)%v, v, normal_velocity, normal)
       end if
       ! Only event-driven dynamics separates a resting disk from the surface.
-      if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call separate_from_surface(sim, i, code, normal)
+      if (elastic .and. law%stops_disks() .and. sim%epoch_end > 0) call separate_from_surface(sim, i, code, normal)
       if (law%tangential%is_rough()) call apply_tangential_impulse_at_wall(sim, i, law%tangential, normal, u, v)
     end if
     if (is_side(code)) call move_piston(sim, i, code, normal, v, u, t)

@@ -3,7 +3,7 @@
 !> clocks of disks, are relative to the time origin `box%epoch`.
 module box_geometry
   use box_side, only: side_t
-  use collisions, only: wall_law_t
+  use wall_law, only: wall_law_t
   use disks, only: disk_t
   use images, only: images_t, moving_images
   use kinds, only: int32, never, real64
@@ -216,7 +216,7 @@ contains
     integer :: k
 
     yes = self%has_rough_walls() .or. &
-      any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%restitution < 1)
+      any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%is_inelastic())
   end function has_lossy_walls
 
   !> True if any wall can exert a torque on disks.

@@ -3,7 +3,8 @@
 !> dynamics.
 module encounters
   use kinds, only: int32, int64, real64
-  use collisions, only: pair_impulse, tangential_impulse
+  use contact_law, only: pair_impulse
+  use tangential_law, only: tangential_impulse
   use disks, only: disk_t, advance_disk
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity

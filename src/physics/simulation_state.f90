@@ -3,7 +3,7 @@
 module simulation_state
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: box_t
-  use collisions, only: contact_law_t
+  use contact_law, only: contact_law_t
   use disks, only: disk_t, extra_t, series_t, source_t, species_by_id, species_t, tag_t, whole_disk_t
   use features, only: features_t
   use fields, only: fields_t

@@ -7,6 +7,7 @@
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
+  use contact_law, only: elastic_contacts
   use disks, only: disks_before, species_by_id, species_t
   use errors, only: error_t, exit_usage, fail
   use event_driven, only: event_driven_t
@@ -81,7 +82,7 @@ contains
       sim%box%gravity = 0
       sim%box%shear_rate = 0
       sim%species = species
-      allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
+      sim%law = elastic_contacts(size(species))
       call sim%list_disks()
     end associate
     if (size(x, 2) == 0) call growth%insert_small_disks(line)

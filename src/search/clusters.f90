@@ -13,7 +13,8 @@
 !> matters only for the tangential impulses of rough disks.
 module clusters
   use kinds, only: int32, real64
-  use collisions, only: speed_law_t, tangential_impulse, tangential_law_t
+  use restitution_law, only: restitution_law_t
+  use tangential_law, only: tangential_impulse, tangential_law_t
   implicit none
   private
   public :: cluster_t, contact_t, most_disks
@@ -44,7 +45,7 @@ module clusters
     real(real64) :: slip = 0.0_real64
     real(real64) :: turn = 0.0_real64      !! angle by which the normal has turned towards the tangent
     real(real64) :: restitution = 1.0_real64
-    type(speed_law_t) :: by_speed = speed_law_t()
+    type(restitution_law_t) :: by_speed = restitution_law_t()
     type(tangential_law_t) :: tangential = tangential_law_t()
   end type contact_t
 

@@ -1,9 +1,8 @@
 !> Variables of the groups `&box`, `&side`, `&obstacle` and `&wall`.
 module boundary_variables
-  use collisions, only: wall_rules
   use motions, only: motion_rows
-  use variable_rows, only: first_angle, in_motion, last_angle, not_negative, positive, tangential, unit_interval, variable_t, &
-    wall_groups
+  use variable_rows, only: first_angle, in_motion, last_angle, positive, variable_t
+  use wall_law, only: wall_law_rows
   implicit none
   private
   public :: boundary_rows
@@ -89,41 +88,6 @@ module boundary_variables
       //"started.", excludes="from to points", &
       otherwise="none; the group describes one wall or polyline")]
 
-  !> Contact-law variables, which the groups `&side`, `&obstacle` and `&wall` have in common.
-  type(variable_t), parameter :: law_rows(*) = [ &
-    variable_t("", "restitution", "real", 1, "optional", "0.9", &
-      "Coefficient of restitution of disks colliding with this boundary: 1 is elastic, 0 perfectly inelastic. The rule " &
-      //"determines whether it applies to both components of the velocity or only to the normal component. Not available for " &
-      //"a thermal boundary (temperature).", unit_interval, &
-      may_change=in_motion, otherwise="contact.wall_restitution"), &
-    variable_t("", "rule", "text", 1, "optional", "'normal'", &
-      "Collision rule of this boundary. Not available for a thermal boundary (temperature).", choices=wall_rules, &
-      may_change=in_motion, otherwise="contact.wall_rule"), &
-    variable_t("", "tangential_restitution", "real", 1, "optional", "0.5", &
-      "Coefficient of tangential restitution of this boundary: -1 for smooth surfaces, 0 if collisions stop the slip, 1 if " &
-      //"they reverse it. Above -1 the boundary is rough, and the disks rotate.", tangential, goes_with="rule normal", &
-      may_change=in_motion, otherwise="contact.wall_tangential_restitution"), &
-    variable_t("", "friction", "real", 1, "optional", "0.3", &
-      "Coulomb friction coefficient of this boundary: upper limit of the ratio of tangential to normal impulse. Needs a rough " &
-      //"boundary (tangential_restitution > -1).", not_negative, goes_with="rule normal", &
-      may_change=in_motion, otherwise="contact.wall_friction"), &
-    variable_t("", "temperature", "real", 1, "optional", "1", &
-      "Temperature kT of a thermal boundary. Disks leave it with random velocities, as if they came from a gas at this " &
-      //"temperature. A thermal boundary can slide (surface_velocity), but has no restitution and cannot move.", &
-      positive, "energy", excludes="restitution rule tangential_restitution friction motion", may_change=in_motion, &
-      otherwise="none; the boundary is not thermal"), &
-    variable_t("", "surface_velocity", "real", 1, "fallback", "0", &
-      "Tangential velocity of the surface, as of a conveyor belt; the boundary itself stays in place. Positive velocities " &
-      //"point along +x on the bottom and top side, along +y on the left and right side, from the first to the second point " &
-      //"of a wall, and counter-clockwise on a circle or an arc. Values other than 0 need a thermal (temperature) or rough " &
-      //"boundary (tangential_restitution > -1).", unit="length/time", may_change=in_motion)]
-
-  integer :: g, r
-  type(variable_t), parameter :: own_law_rows(*) = [((variable_t(wall_groups(g), law_rows(r)%name, law_rows(r)%kind, &
-    law_rows(r)%size, law_rows(r)%status, law_rows(r)%value, law_rows(r)%help, law_rows(r)%range, law_rows(r)%unit, &
-    law_rows(r)%choices, law_rows(r)%goes_with, law_rows(r)%excludes, law_rows(r)%may_change, law_rows(r)%otherwise), &
-    r=1, size(law_rows)), g=1, size(wall_groups))]
-
-  type(variable_t), parameter :: boundary_rows(*) = [box_rows, side_rows, obstacle_rows, wall_rows, own_law_rows]
+  type(variable_t), parameter :: boundary_rows(*) = [box_rows, side_rows, obstacle_rows, wall_rows, wall_law_rows]
 
 end module boundary_variables

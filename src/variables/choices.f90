@@ -1,6 +1,7 @@
 !> Meanings of all keywords.
 module choices
-  use collisions, only: law_choices, rule_choices
+  use restitution_law, only: law_choices
+  use wall_law, only: rule_choices
   use drives, only: drive_choices
   use motions, only: motion_choices
   use placements, only: placement_choices

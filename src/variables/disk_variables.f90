@@ -1,9 +1,8 @@
 !> Variables of the groups `&species` and `&contact`.
 module disk_variables
-  use collisions, only: restitution_laws, wall_rules
+  use contact_law, only: contact_rows
   use placements, only: placement_rows
-  use variable_rows, only: count_of_disks, fraction, in_motion, moment, not_negative, positive, &
-    spread_of_radii, tangential, unit_interval, variable_t
+  use variable_rows, only: count_of_disks, fraction, not_negative, positive, spread_of_radii, variable_t
   implicit none
   private
   public :: disk_rows
@@ -87,64 +86,6 @@ module disk_variables
       "Initial temperature kT of the rotation: angular velocities are Gaussian with variance kT/I, where I is the moment of " &
       //"inertia.", not_negative, "energy", excludes="angular_velocity", &
       otherwise="none; all disks have the same angular_velocity")]
-
-  type(variable_t), parameter :: contact_rows(*) = [ &
-    variable_t("contact", "restitution", "real", 1, "default", "1", &
-      "Coefficient of restitution of disk-disk collisions: 1 is elastic, 0 perfectly inelastic. Collisions reverse the " &
-      //"relative velocity along the line of centres and multiply it by this coefficient.", unit_interval, may_change=in_motion), &
-    variable_t("contact", "wall_restitution", "real", 1, "optional", "1", &
-      "Coefficient of restitution of collisions with sides and obstacles, except thermal boundaries and boundaries with a " &
-      //"coefficient of their own (restitution in &side, &obstacle or &wall).", &
-      unit_interval, may_change=in_motion, &
-      otherwise="contact.restitution"), &
-    variable_t("contact", "restitution_law", "text", 1, "default", "'constant'", &
-      "Dependence of all coefficients of restitution on the impact speed g, the normal component of the relative velocity.", &
-      choices=restitution_laws, may_change=in_motion), &
-    variable_t("contact", "reference_speed", "real", 1, "required", "1", &
-      "Reference value g0 of the impact speed. Above g0 the coefficients of restitution have the values in the input; below " &
-      //"g0 they are closer to 1, or equal to 1 with restitution_law = 'elastic_below'. With 'power' and 'viscoelastic', " &
-      //"choose g0 above the impact speeds that occur; with 'elastic_below', choose g0 well below them.", &
-      positive, "length/time", goes_with="restitution_law power viscoelastic elastic_below", may_change=in_motion), &
-    variable_t("contact", "wall_rule", "text", 1, "default", "'velocity'", &
-      "Collision rule of sides and obstacles, except thermal boundaries and boundaries with a rule of their own (rule in " &
-      //"&side, &obstacle or &wall).", choices=wall_rules, may_change=in_motion), &
-    variable_t("contact", "contact_time", "real", 1, "default", "0", &
-      "Contact duration t_c of the TC model, which prevents inelastic collapse: a collision is elastic if one of its partners " &
-      //"collided less than t_c ago. 0 switches the model off. Choose t_c far below the mean time between collisions and, for " &
-      //"grains of diameter d resting under gravity g, below sqrt(d/g). The model does not prevent the collapse of resting " &
-      //"grains with friction or with a tangential restitution between -1 and 1: these dissipate energy even in such elastic " &
-      //"collisions. Not available with stop.at_rest.", &
-      not_negative, "time", may_change=in_motion), &
-    variable_t("contact", "tangential_restitution", "real", 1, "default", "-1", &
-      "Coefficient of tangential restitution of disk-disk collisions: -1 for smooth surfaces, 0 if collisions stop the slip, " &
-      //"1 if they reverse it. Above -1 the disks are rough and rotate. Values between -1 and 1 dissipate energy even in " &
-      //"collisions that the TC model (contact_time) makes elastic. Grains resting in a dense bed then collapse or collide " &
-      //"millions of times; use -1 or 1 for such grains.", &
-      tangential, may_change=in_motion), &
-    variable_t("contact", "friction", "real", 1, "optional", "0.3", &
-      "Coulomb friction coefficient of disk-disk collisions: upper limit of the ratio of tangential to normal impulse. Needs " &
-      //"rough disks (tangential_restitution > -1). Friction dissipates energy even in collisions that the TC model " &
-      //"(contact_time) makes elastic. Grains resting in a dense bed then collapse or collide millions of times; use " &
-      //"tangential_restitution = 1 without friction for such grains.", &
-      not_negative, may_change=in_motion, &
-      otherwise="the tangential impulse has no limit"), &
-    variable_t("contact", "inertia", "real", 1, "default", "0.5", &
-      "Moment of inertia of a disk in units of mass times radius squared: 0.5 for a uniform disk, 1 for a ring. Matters only " &
-      //"for rotating disks: with rough disks or boundaries, or with initial angular velocities.", moment, may_change=in_motion), &
-    variable_t("contact", "wall_tangential_restitution", "real", 1, "optional", "0.5", &
-      "Coefficient of tangential restitution of collisions with sides and obstacles, except those with a value of their own " &
-      //"(tangential_restitution in &side, &obstacle or &wall): -1 for smooth surfaces, 0 if collisions stop the slip, 1 if " &
-      //"they reverse it.", tangential, goes_with="wall_rule normal", &
-      may_change=in_motion, otherwise="contact.tangential_restitution"), &
-    variable_t("contact", "wall_friction", "real", 1, "optional", "0.3", &
-      "Coulomb friction coefficient of collisions with sides and obstacles, except those with a value of their own (friction " &
-      //"in &side, &obstacle or &wall). Needs rough boundaries (wall_tangential_restitution > -1).", &
-      not_negative, goes_with="wall_rule normal", &
-      may_change=in_motion, otherwise="contact.friction"), &
-    variable_t("contact", "pair_restitution", "real", 0, "optional", "1, 0.9, 0.9, 0.8", &
-      "Coefficients of restitution of each pair of species, given instead of contact.restitution: a symmetric n x n matrix " &
-      //"for n species, listed as 1-1, 1-2, ..., 2-1, 2-2, ... in the order of the species in the input file.", unit_interval, &
-      may_change=in_motion, otherwise="contact.restitution for all pairs")]
 
   type(variable_t), parameter :: disk_rows(*) = [species_rows, contact_rows]
 
