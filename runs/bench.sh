@@ -235,7 +235,7 @@ instructions() {
 # counted COMMAND...: executes COMMAND, which runs the simulation program under valgrind, and prints the number of instructions.
 counted() {
   run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
-  run_by+=(--toggle-collect=__{event_driven_MOD_{advance,start,renew},epochs_MOD_move_epoch,kicks_MOD_kick}'*')
+  run_by+=(--toggle-collect=__{event_driven_MOD_{advance,start,renew},epochs_MOD_move_epoch,{andersen,brownian,noise,active}_MOD_kick}'*')
   "$@" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
   awk '/Collected/ { print $4 }' "$work/count"
 }
