@@ -155,13 +155,15 @@ def test_parallel_runs_members_on_two_hosts(ensemble, hosts, tmp_path):
 
 
 def test_parallel_reports_a_member_that_fails(ensemble):
+    """With inelastic walls the disks undergo an inelastic collapse under gravity."""
     need("parallel")
-    result = ensemble(
-        *("--engine", "parallel", "-j", 2, *SMALL, "--scan", "species.gas.radius=0.004,0.2")
-    )
+    gas = ("species.gas.count=50", "box.gravity=0,-100", "stop.collisions_per_disk=100")
+    settings = [word for value in gas for word in ("--set", value)]
+    scan = ("--scan", "contact.wall_restitution=1,0.5")
+    result = ensemble("--engine", "parallel", "-j", 2, *settings, *scan)
     assert result.returncode == 1
     assert "1 of 2 members finished, 1 failed" in result.stderr
-    assert "failed: gas.radius_0.2" in result.stderr
+    assert "failed: wall_restitution_0.5" in result.stderr
 
 
 def test_term_reaches_members_on_other_hosts(ensemble, hosts, tmp_path):
