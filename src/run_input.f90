@@ -9,7 +9,7 @@ module run_input
   use input_fit, only: check_fit, complete_settings
   use input_groups, only: group_t, range_of, same_value, same_values
   use input_problems, only: problem_list_t
-  use input_settings, only: resolve_settings
+  use input_settings, only: check_interval, resolve_settings
   use input_text, only: read_text
   use kinds, only: int64, real64
   use namelist_input, only: read_groups
@@ -216,14 +216,12 @@ contains
     type(run_input_t), intent(in) :: input
     real(real64), intent(in) :: t                                   !! time since the start [time]
     type(problem_list_t), intent(inout) :: problems
-    real(real64), parameter :: most = 1.0e15_real64
     integer :: range(2), k
 
     range = range_of(input%groups, ["source"])
     do k = 1, range(2) - range(1) + 1
       associate (source => input%settings%source(k), group => input%groups(range(1) + k - 1))
-        if (source%end_time >= t .and. t/source%interval > most) call group%complain("interval", &
-          written(t/source%interval)//" intervals until this change; allowed: up to "//written(most), problems)
+        if (source%end_time >= t) call check_interval(source, group, t, "this change", problems)
       end associate
     end do
   end subroutine check_entries

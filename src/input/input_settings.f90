@@ -23,7 +23,7 @@ module input_settings
   use variables, only: is_repeated, obstacle_groups, row_of, variables_of, words_of
   implicit none
   private
-  public :: resolve_settings
+  public :: check_interval, resolve_settings
 
   integer(int64), parameter :: unlimited = huge(1_int64)
   !> Upper limit for the number of calls of `add_conflict`.
@@ -545,20 +545,32 @@ contains
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
-    real(real64), parameter :: most = 1.0e15_real64
     real(real64) :: last                                ! latest known time of an entry [time]
     integer :: s(2), k
 
     s = range_of(groups, ["source"])
     do k = 1, s(2) - s(1) + 1
-      associate (source => settings%source(k), own => groups(s(1) + k - 1))
+      associate (source => settings%source(k))
         last = max(source%start_time, merge(min(source%end_time, settings%stop%time), 0.0_real64, &
           min(source%end_time, settings%stop%time) < never))
-        if (last/source%interval > most) call own%complain("interval", written(last/source%interval)//" intervals until " &
-          //"the end of the source or of the run; allowed: up to "//written(most), problems)
+        call check_interval(source, groups(s(1) + k - 1), last, "the end of the source or of the run", problems)
       end associate
     end do
   end subroutine check_sources
+
+  !> Reports a source whose interval is too short for its entries up to a time to be counted
+  !> exactly.
+  subroutine check_interval(source, group, last, until, problems)
+    type(source_t), intent(in) :: source
+    type(group_t), intent(in) :: group
+    real(real64), intent(in) :: last                     !! time [time]
+    character(len=*), intent(in) :: until                !! name of this time in the message
+    type(problem_list_t), intent(inout) :: problems
+    real(real64), parameter :: most = 1.0e15_real64
+
+    if (last/source%interval > most) call group%complain("interval", &
+      written(last/source%interval)//" intervals until "//until//"; allowed: up to "//written(most), problems)
+  end subroutine check_interval
 
   !> Reports an interval so short that the time limit stop.time comprises more than `most`
   !> intervals.
