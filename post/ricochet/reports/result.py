@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ..reading.files import optional_package
+from ..reading.files import counted, optional_package
 from ..reading.reader import Run
 from .groups import Group
 from .tables import Table, columns, text_of
@@ -115,7 +115,7 @@ class Result:
 
     def __repr__(self) -> str:
         lines = [
-            f"{self.name} of {len(self.runs)} run" + "s" * (len(self.runs) != 1),
+            f"{self.name} of {counted(len(self.runs), 'run')}",
             text_of(self.shown),
         ]
         return "\n".join(lines + [f"warning: {text}" for text in self.warnings])

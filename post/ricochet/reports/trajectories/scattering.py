@@ -8,6 +8,7 @@ import numpy as np
 from ...figures.drawing import COLOURS, plt
 from ...figures.sheet import Panel, Sheet, legend_above
 from ...predictions.theory import scattering_angle
+from ...reading.files import counted
 from ...reading.nature import Refused, allow
 from ...reading.reader import Run
 from ..groups import Group, each_run
@@ -60,7 +61,7 @@ def draw_angles(axes: plt.Axes, result: Result) -> None:
     if all(restitution == 1 for _, restitution in result.values):
         label, heavy = "infinite mass ratio: $2\\arccos(|b|/R_{12})$", scattering_angle(fine)
         axes.plot(fine, np.degrees(heavy), color=COLOURS[4], lw=1.2, ls="--", label=label)
-    label = f"simulation, {len(s)} run" + "s" * (len(s) > 1)
+    label = f"simulation, {counted(len(s), 'run')}"
     axes.plot(s, angle, ls="", marker="o", mfc="none", color=COLOURS[0], label=label)
     axes.set(ylabel="scattering angle θ (degrees)", ylim=(-5, 185), yticks=range(0, 181, 30))
     axes.set_xlabel("impact parameter $b/R_{12}$")
