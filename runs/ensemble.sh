@@ -404,8 +404,7 @@ check_inputs() {
   local k kind reason arguments
   local -A seen=()
   for k in "${!names[@]}"; do
-    kind="x${overrides[k]} "
-    while [[ $kind =~ ^(.*)'--set run.seed='[^\ ]*' '(.*)$ ]]; do kind=${BASH_REMATCH[1]}${BASH_REMATCH[2]}; done
+    find_kind "${overrides[k]}"
     if [[ -n ${seen[$kind]:-} ]] || is_done "${names[k]}" || has_failed "${names[k]}"; then continue; fi
     seen[$kind]=1 arguments=("$input" --check --quiet)
     add_overrides "${overrides[k]}"

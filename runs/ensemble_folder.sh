@@ -67,13 +67,18 @@ check_member() {
   [[ -z $dry ]] || ((status == 0)) || printf '%s: note: member %s cannot run yet: %s\n' "$me" "${names[$1]}" "${reason##*$'\n'}" >&2
 }
 
+# find_kind OVERRIDES: stores in `kind` what members that differ only in their seed have in common.
+find_kind() {
+  kind="kind $1 "
+  while [[ $kind =~ ^(.*)'--set run.seed='[^\ ]*' '(.*)$ ]]; do kind=${BASH_REMATCH[1]}${BASH_REMATCH[2]}; done
+}
+
 # Checks each value of a variable, except seeds, in the first member run that uses it, before anything is written.
 check_settings() {
   local k kind pair fresh arguments
   local -A seen=()
   for k in "${!names[@]}"; do
-    kind="kind ${overrides[k]}"
-    [[ ! $kind =~ ^(.*)'--set run.seed='[0-9]*$ ]] || kind=${BASH_REMATCH[1]}
+    find_kind "${overrides[k]}"
     if [[ -n ${seen[$kind]:-} ]] || is_done "${names[k]}"; then continue; fi
     fresh=$((${#seen[@]} == 0)) arguments=() seen[$kind]=1
     add_overrides "${overrides[k]}"
