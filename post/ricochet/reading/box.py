@@ -26,6 +26,11 @@ class BoxResults(Results):
         return self.lower + self.edges
 
     @property
+    def shear_rate(self) -> float:
+        """Gradient along y of the mean velocity along x; 0 unless the box is sheared."""
+        return float(self.parameter("box", "shear_rate", 0.0))
+
+    @property
     def changes(self) -> list[Change]:
         """Changes of variables during the run, with time, name and new value."""
         return changes_in(self.parameters.get("changes", ""))
