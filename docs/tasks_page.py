@@ -25,13 +25,13 @@ PAGES = ("exam", "gravity")
 TEXTS = {
     "mixture": """\
 Over eight seeds, the light disks end with ⟨K⟩ = {K_light} and the heavy disks with {K_heavy}
-(theory 1.25). Their mean speeds are {v_light} (theory {v_light_theory}) and {v_heavy} (theory
-{v_heavy_theory}).
+(theory 1.25). The mean speeds are {v_light} (light disks; theory {v_light_theory}) and {v_heavy}
+(heavy disks; theory {v_heavy_theory}).
 """,
     "cooling": """\
 After 20 collisions per disk the heavy disks are hotter than the light ones by the factor {ratio_1}
-for ξ = 1, {ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds). There is no
-equipartition for ξ < 1.
+for ξ = 1, {ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds). For ξ < 1 the two
+species have different temperatures: the gas violates equipartition.
 """,
     "walls": """\
 After 20 collisions per disk K/K₀ is {left_velocity} with the walls of the exam and {left_normal}
@@ -39,14 +39,14 @@ with smooth walls (ξ = 0.8, eight seeds).
 """,
     "crater": """\
 - *Size.* In a bed of 2000 grains {hit} are hit, and {displaced} move by more than their radius.
-  They come from a region {width} wide and {depth} deep (eight beds).
+  The displaced grains come from a region {width} wide and {depth} deep (means of eight beds).
 - *Mass.* The number of hit grains grows with the mass of the projectile to the power {hit_mass}.
 - *Speed.* The number of hit grains grows with the speed to the power {hit_speed}. The crater does
   not depend on the speed.
 - *Radius.* In a large bed the crater shrinks slowly with the radius of the projectile. In a small
   bed it grows with the radius, because a small projectile reaches the floor and loses its energy
-  there. This also happens at the open points of the figure, although all its beds have 2000
-  grains.
+  there. In the figure all beds have 2000 grains, and the small projectiles of the open points reach
+  the floor, too.
 - *Restitution.* As ξ approaches 1 the crater grows to the whole bed.
 
 | grains in the bed | hit with radius 2 | radius 5 | radius 10 |
@@ -54,10 +54,11 @@ with smooth walls (ξ = 0.8, eight seeds).
 | 5000 | 1043 | 951 | 905 |
 | 1000 | 537 | 610 | 663 |
 
-How large must the bed be? About 7.5 M (1/f - 1)/(1 - ξ²) grains are needed, where M is the mass
-ratio and f the fraction of the energy that is left at the end. Here the estimate is 2250 grains.
-The slightly smaller bed of 2000 grains is acceptable, because fewer than 20 collisions with walls
-occur. The scripts exclude a crater with more wall collisions from the fit (open symbols).
+How large must the bed be? A bed needs about 7.5 M (1/f - 1)/(1 - ξ²) grains, where M is the mass
+ratio and f the fraction of the energy that is left at the end. For this exercise the estimate is
+2250 grains. The slightly smaller bed of 2000 grains is acceptable, because fewer than 20 collisions
+with walls occur. If more wall collisions occur, the scripts exclude the crater from the fit (open
+symbols).
 """,
     "energy": """\
 The total energy of all methods is constant to {energy_change}. The table lists the missed
