@@ -61,23 +61,23 @@ with walls occur. If more wall collisions occur, the scripts exclude the crater 
 symbols).
 """,
     "energy": """\
-The total energy of all methods is constant to {energy_change}. The table lists the missed
-collisions in per cent (32 pairs of runs of 520 s).
+With every method the total energy is constant to a relative error of {energy_change}. The table
+compares the measured and the calculated fraction of missed collisions (32 pairs of runs of 520 s).
 
-| dt | missed | formula |
+| dt | missed (%) | formula (%) |
 |---|---|---|
 | 0.001 | {missed_0.001} | {expected_0.001} |
 | 0.002 | {missed_0.002} | {expected_0.002} |
 | 0.004 | {missed_0.004} | {expected_0.004} |
 """,
     "equipartition": """\
-After a time T, the mean energies of both species agree within 10 %. Among the four v₀ the shortest
-T is ({T_first}) s, and the longest T is ({T_last}) s. The time hardly depends on v₀.
+The time T after which the mean energies of both species agree within 10 % hardly depends on v₀:
+among the four values of v₀, the shortest T is ({T_first}) s, and the longest T is ({T_last}) s.
 """,
     "laws": """\
-The table lists slopes measured with seed 1, divided by those of the exponential laws. The dashed
-lines are the laws for 60 disks of finite size with a fixed energy, whose slopes differ slightly
-from 1.
+The table lists the slopes measured with seed 1, divided by the slopes of the exponential laws. The
+dashed lines in the figure are the laws for 60 disks of finite size with a fixed energy. The
+slopes of these laws differ slightly from 1 (last column).
 
 | histogram | measured | law for 60 disks |
 |---|---|---|
