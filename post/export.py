@@ -16,7 +16,7 @@ import math
 from pathlib import Path
 
 from ricochet import Run, RunError
-from ricochet.reading.bridges import write_gsd, write_lammps
+from ricochet.exchange.bridges import write_gsd, write_lammps
 from ricochet.reading.files import destination
 from ricochet.reports.options import chosen_frames
 from ricochet.script import command_line, launch, report

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from . import packages as packages  # imported first, because it reports missing packages
 from .aliases import Aliases
-from .reading.bridges import mdanalysis_universe
+from .exchange.bridges import mdanalysis_universe
 from .reading.files import RunError
 from .reading.frames import Frames, Series
 from .reading.reader import Event, EventLog, Frame, Obstacle, Run, read_run
@@ -82,18 +82,20 @@ if TYPE_CHECKING:  # for type checkers only, because `__getattr__` loads these m
     from .predictions import walls as walls
     from .reading import arrays as arrays
     from .reading import box as box
-    from .reading import bridges as bridges
+    from .exchange import bridges as bridges
+    from .reading import changed as changed
     from .reading import contacts as contacts
     from .reading import files as files
-    from .reading import foreign as foreign
+    from .exchange import foreign as foreign
     from .reading import frames as frames
-    from .reading import layout as layout
     from .reading import nature as nature
     from .reading import paths as paths
+    from .reading import pressure as pressure
     from .reading import reader as reader
     from .reading import records as records
     from .reading import results as results
     from .reading import units as units
+    from .reading import windows as windows
     from .reports import groups as groups
     from .reports import options as options
     from .reports import registry as registry

@@ -12,7 +12,16 @@ from types import ModuleType
 
 from .commands import HERE
 
-FOLDERS = ("reading", "running", "predictions", "analysis", "figures", "reports", "pages")
+FOLDERS = (
+    "reading",
+    "exchange",
+    "running",
+    "predictions",
+    "analysis",
+    "figures",
+    "reports",
+    "pages",
+)
 
 
 def modules() -> dict[str, str]:

@@ -26,6 +26,7 @@ from .reports import analysis
 from .reports.options import (
     RENAMED,
     shared,
+    time_window,
     unit_names,
 )
 from .reports.registry import distinct
@@ -57,6 +58,8 @@ class Parser(argparse.ArgumentParser):
         if hasattr(known, "runs"):
             paths = known.runs if known.paired else finished(known.runs)
             known.runs = [replace(read_run(path), units=known.units) for path in paths]
+            if getattr(known, "times", None):
+                known.runs = [run.window(*known.times) for run in known.runs]
             for run in [] if known.open_systems else known.runs:
                 stays_in_box(run)
             if not known.repeated:
@@ -194,6 +197,8 @@ def run_analysis(name: str, doc: str) -> None:
     parser.add_argument("--panel", metavar="NAME", help="panel to draw alone [all panels]")
     paper = "width of the figure, such as 8.5cm, or slide for a projector [16cm]"
     parser.add_argument("--width", metavar="WIDTH", help=paper)
+    part = "only the times from START up to END, as a run of the laws then in force; 20: has no END"
+    parser.add_argument("--times", type=time_window, metavar="START:END", help=part)
     for option in own.options:
         option.add_to(parser)
     args = parser.parse_args()

@@ -12,7 +12,9 @@ from ..analysis.equilibrium import SPEEDS_FORGET, conserved_momentum
 from ..analysis.statistics import SeriesMean, correlated_mean, equilibration
 from ..predictions.walls import virial_pressure
 from ..reading.nature import Nature, bath_temperatures
-from ..reading.reader import Run, Series, obstacles_of, walls_of
+from ..reading.box import obstacles_of, walls_of
+from ..reading.frames import Series
+from ..reading.reader import Run
 from ..reading.records import Change
 from ..running.simulation import Simulation
 

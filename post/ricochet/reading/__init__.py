@@ -1,1 +1,1 @@
-"""Read output files, determine the traits of runs, and convert runs to other types."""
+"""Read output files, and determine the traits of runs."""

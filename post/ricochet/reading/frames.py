@@ -5,14 +5,15 @@ Both can be used like arrays in expressions and NumPy functions, as in `run.velo
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from .files import RunError, Unsound, open_file
+from .files import RunError, Unsound, did_you_mean, open_file
 
 DISKS = "particles/disks"
 WHOLE = (type(None), type(...), bool, np.bool_)  # first indices that do not select frames
@@ -130,6 +131,11 @@ class Frames(Values):
     shape: tuple[int, ...]  # (T, N), or (T, N, 2)
     # keeps a temporary file in existence
     folder: object = field(default=None, repr=False)
+    first: int = 0  # index in the file of the first frame
+
+    def part(self, start: int, end: int) -> "Frames":
+        """Return the frames from `start` up to, but not including, `end`."""
+        return replace(self, shape=(end - start, *self.shape[1:]), first=self.first + start)
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -173,7 +179,7 @@ class Frames(Values):
 
     def read(self, chosen: np.ndarray) -> np.ndarray:
         """Read frames from the file, in the order of their indices in `chosen`."""
-        steps = np.unique(np.diff(chosen))
+        steps, chosen = np.unique(np.diff(chosen)), chosen + self.first
         with open_file(self.path) as file:
             if self.name not in file[DISKS]:
                 raise Unsound(f"has no {self.name} in its frames, see output.frame_columns")
@@ -185,3 +191,40 @@ class Frames(Values):
             else:  # much faster than indexing with a list in h5py
                 values = np.stack([data[k] for k in chosen])
         return values.astype(float if values.dtype.kind == "f" else np.int64)
+
+
+# --- time series in an output file ---
+
+
+def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
+    """Yield the names of all time series in an HDF5 group and its subgroups."""
+    for name, item in group.items():
+        if isinstance(item, h5py.Group):
+            if "value" in item:
+                yield path + name
+            else:
+                yield from series_in(item, f"{path}{name}/")
+
+
+def series_of(file: h5py.File, name: str, count: int) -> Series:
+    """Return the first `count` samples of an observable in an open HDF5 file."""
+    if f"observables/{name}/value" not in file:
+        near = did_you_mean(name, series_in(file["observables"]))
+        raise Unsound(f"has no observable '{name}'{near}")
+    if count == 0:
+        raise Unsound("holds no observables yet")
+    group = file[f"observables/{name}"]
+    return Series(*(rows(group[part], count) for part in ("time", "value")))
+
+
+def committed(file: h5py.File, group: str) -> int:
+    """Return the number of complete samples in a group, which may have space for further ones."""
+    return int(file[group]["committed"][()])
+
+
+def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
+    """Return the first `count` rows of a dataset, or all; real numbers in double precision."""
+    values = data[:count]
+    if count is not None and len(values) < count:
+        raise Unsound(f"{data.name} holds {len(values)} of {count} samples")
+    return values.astype(float, copy=False) if values.dtype.kind == "f" else values

@@ -19,7 +19,7 @@ from .files import RunError
 ROUNDING = 1e-6  # relative energy loss up to which it may be a rounding error
 #: All traits, with their descriptions in error messages.
 TRAITS = {
-    "changed": "was changed during the run",
+    "changed": "was changed during the run (--times takes the time between two changes)",
     "collapsed": "passed an inelastic collapse, after which rounding errors determine its state",
     "time_stepped": "is time-stepped",
     "sheared": "is sheared (box.shear_rate)",

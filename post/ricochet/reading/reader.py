@@ -10,12 +10,13 @@
 T is the number of frames, N that of disks and S that of species. All quantities are in the units of
 the input file. Frames are read on demand, so that a file may be larger than the memory. An
 unfinished output (`.part`) is read up to its last complete frame. Only this module and the modules
-`results` and `layout` depend on the layout of the HDF5 file.
+`results` and `frames` depend on the layout of the HDF5 file.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +26,7 @@ import numpy as np
 from .arrays import Index, as_index
 from .box import obstacles_of, walls_of
 from .files import RunError, Unsound, open_file, optional_package, tree
-from .frames import DISKS, Frames, NoSuchFrame
-from .layout import committed, rows
+from .frames import DISKS, Frames, NoSuchFrame, committed, rows
 from .nature import TRAITS, allow
 from .pressure import PressureResults
 from .records import Event, EventLog, Obstacle, Restitution, Species, span
@@ -34,6 +34,8 @@ from .results import SIDES
 
 if TYPE_CHECKING:
     import xarray
+
+    from .windows import Window
 
 __all__ = [
     "SIDES",
@@ -317,6 +319,56 @@ class Run(PressureResults):
         data |= {name: ("disk", getattr(self, name)) for name in ("mass", "radius", "species")}
         axes = {"time": self.time, "disk": np.arange(self.n_disks) + 1, "component": ["x", "y"]}
         return xarray.Dataset(data, axes, {"path": str(self.path), "seed": self.seed})
+
+    def window(self, start: float, end: float = np.inf) -> "Window":
+        """Return a part of the run, as a run under the laws in force during this time.
+
+        All times in the window are measured from `start`. Counts and sums, such as the numbers of
+        collisions and the dissipated energy, begin at zero with the first sample of the window.
+        The parameters have their values at `start`; changes within the window are listed in
+        `changes`.
+
+        Parameters
+        ----------
+        start, end : float
+            times; the frames and samples at `end` are not included, because the state at the time
+            of a change is the state after it
+
+        Returns
+        -------
+        Run
+            the window
+
+        Raises
+        ------
+        RunError
+            if the window contains no frame
+
+        Examples
+        --------
+        >>> late = run.window(0.1)
+        >>> len(late) < len(run), bool(late.time[0] < 0.1)
+        (True, True)
+        """
+        from .windows import window_of  # not at the top, because that module imports this one
+
+        return window_of(self, start, end)
+
+    def windows(self) -> "list[Window]":
+        """Return the windows between successive changes during the run; see `window`.
+
+        Returns
+        -------
+        list of Run
+            the windows in chronological order
+
+        Examples
+        --------
+        >>> len(run.windows())  # without changes, the whole run
+        1
+        """
+        times = sorted({0.0, *(change.time for change in self.changes), np.inf})
+        return [self.window(start, end) for start, end in pairwise(times)]
 
     @property
     def restitution(self) -> float:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .files import RunError, Unsound, open_file, optional_package
-from .frames import Frames, Series
-from .layout import committed, rows, series_in, series_of
+from .frames import Frames, Series, committed, rows, series_in, series_of
 from .nature import Nature, nature_of
 from .records import EventLog, Obstacle
 from .units import UNNAMED, Units
@@ -144,9 +143,8 @@ class Results:
         pandas = optional_package("pandas", "to_dataframe")
 
         columns: dict[str, np.ndarray] = {}
-        with open_file(self.path) as file:
-            series = {name: series_of(file, name, self._samples) for name in self.observables}
-        for name, (time, value) in series.items():
+        for name in self.observables:
+            time, value = self.observable(name)
             parts = {(): ("",), (2,): ("_x", "_y"), (4,): [f"_{side}" for side in SIDES]}
             values = value.reshape(len(time), -1).T
             if name in TENSORS:

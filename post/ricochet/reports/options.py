@@ -56,6 +56,16 @@ def not_negative(text: str) -> float:
     return value
 
 
+def time_window(text: str) -> tuple[float, float]:
+    """Convert a text such as '20:40', '20:' or ':40' to the first and last time of a window."""
+    try:
+        start, end = text.split(":")
+        return float(start or 0), float(end or "inf")
+    except ValueError:
+        problem = f"'{text}' is not a window of time such as 20:40 or 20:"
+        raise argparse.ArgumentTypeError(problem) from None
+
+
 def unit_names(text: str) -> Units:
     """Convert a text such as 'length=cm,time=s' to names of units."""
     try:

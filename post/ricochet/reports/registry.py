@@ -15,7 +15,7 @@ from ..reading.reader import Run, read_run
 from ..reading.units import units_of
 from . import analyses
 from .groups import Group, Grouping, differences, together
-from .options import Option
+from .options import Option, time_window
 from .result import Result
 from .tables import once
 
@@ -64,8 +64,11 @@ class Analysis:
             if name == "units":
                 units = units_of(value) if isinstance(value, str) else value
                 found = [replace(run, units=units) for run in found]
+            elif name == "times":
+                span = time_window(value) if isinstance(value, str) else value
+                found = [run.window(*span) for run in found]
             elif name not in values:
-                known = [*values, "units"]
+                known = [*values, "units", "times"]
                 hint = did_you_mean(name, known) or f"; there are {', '.join(known)}"
                 raise ValueError(f"{self.name} has no option {name}{hint}")
         values |= {

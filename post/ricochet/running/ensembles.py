@@ -33,7 +33,7 @@ import h5py
 import numpy as np
 
 from ..reading.files import RunError, open_file, optional_package, plain
-from ..reading.layout import committed
+from ..reading.frames import committed
 from .inputs import read_input
 from .program import STOPPED, ProgramError, find_program, flat, tied, value_text
 from .simulation import Simulation

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from .arrays import Index, chosen
-from .files import RunError, counted, destination, optional_package
+from ..reading.arrays import Index, chosen
+from ..reading.files import RunError, counted, destination, optional_package
 from .foreign import DAMAGE, check_counts, check_index, check_values
-from .nature import Refused
-from .reader import Run
+from ..reading.nature import Refused
+from ..reading.reader import Run
 
 if TYPE_CHECKING:
     import MDAnalysis

@@ -1,0 +1,209 @@
+"""Windows of a run: a part of it between two times is a run under the laws then in force."""
+
+import numpy as np
+import pytest
+
+import ricochet as package
+from ricochet import RunError, Simulation, read_run, write_start
+from ricochet.reading.changed import changed, value_of
+from ricochet.reading.records import changes_in
+from ricochet.reading.windows import accumulates
+from synthetic_run import run_script
+
+#: A dissipative gas with an obstacle in a box, and all kinds of observables.
+BOX = """
+&run seed = 3 /
+&box upper = 1.2, 1 /
+&contact restitution = 0.9 /
+&obstacle name = 'post' centre = 0.6, 0.5 radius = 0.1 /
+&species name = 'grain' count = 40 radius = 0.02 {start} /
+&stop time = {end} /
+&output virial_tensor = .true. event_log = .true.
+        frames_every_time = 0.05 observables_every_time = 0.05 /
+"""
+
+#: A gas whose walls, gravity and laws change.
+CHANGED = """
+&run seed = 5 /
+&box upper = 2, 1 /
+&side name = 'right' motion = 'constant_velocity' position = 1 velocity = -0.5 end_time = 1 /
+&contact restitution = 0.95 /
+&species name = 'gas' count = 60 radius = 0.01 region = 0, 1, 0, 1 temperature = 1 /
+&change time = 1 set = 'contact.restitution=0.8', 'box.gravity=0,-0.5' /
+&change time = 2 set = 'side.left.temperature=2', 'contact.wall_restitution=1' /
+&stop time = 3 /
+&output frames_every_time = 0.1 observables_every_time = 0.05 /
+"""
+
+
+def test_a_window_has_the_observables_of_a_run_that_starts_with_its_first_frame(
+    simulated, tmp_path
+):
+    """Sums and counts begin at zero, also in the mean pressure since the start."""
+    whole = simulated(BOX.format(start="temperature = 1", end=0.4))
+    window = whole.window(0.2)
+    place = tmp_path / "start.txt"
+    write_start(place, whole.position[4], whole.velocity[4])
+    placed = f"placement = 'file' file = '{place}'"
+    again = simulated(BOX.format(start=placed, end=0.2), name="again")
+    np.testing.assert_allclose(window.time, again.time, atol=1e-12)
+    np.testing.assert_allclose(window.position[:], again.position[:], atol=1e-9)
+    np.testing.assert_allclose(window.velocity[1:3], again.velocity[1:3], atol=1e-9)
+    for name in again.observables:
+        time, value = window.observable(name)
+        np.testing.assert_allclose(time, again.observable(name).time, atol=1e-12)
+        close = {"rtol": 1e-7, "atol": 1e-9}
+        np.testing.assert_allclose(value, again.observable(name).value, **close, err_msg=name)
+    log, fresh = window.event_log(), again.event_log()
+    np.testing.assert_array_equal(log.i, fresh.i)
+    np.testing.assert_allclose(log.time, fresh.time, atol=1e-9)
+    assert window.pressure(0, 0.2) == pytest.approx(again.pressure(0, 0.2))
+    table, other = window.to_dataframe(), again.to_dataframe()
+    np.testing.assert_allclose(table["side_impulse_left"], other["side_impulse_left"], rtol=1e-7)
+
+
+def test_windows_between_changes_have_the_laws_then_in_force(simulated):
+    whole = simulated(CHANGED)
+    parts = whole.windows()
+    assert [part.restitution for part in parts] == [0.95, 0.8, 0.8]
+    assert [part.parameter("contact", "wall_restitution") for part in parts] == [0.95, 0.8, 1.0]
+    assert [part.gravity[1] for part in parts] == [0, -0.5, -0.5]
+    assert ["moving_sides" in part.nature for part in parts] == [True, False, False]
+    assert ["thermal_walls" in part.nature for part in parts] == [False, False, True]
+    assert all("changed" not in part.nature and not part.changes for part in parts)
+    np.testing.assert_allclose([part.upper[0] for part in parts], [1, 1.5, 1.5])
+    np.testing.assert_allclose([part.accessible_area(0.0) for part in parts], [1, 1.5, 1.5])
+    assert sum(len(part) for part in parts) == len(whole)
+    across = whole.window(0.5, 2.5)
+    assert "changed" in across.nature
+    assert [change.time for change in across.changes] == [0.5, 0.5, 1.5, 1.5]
+    for part in (*parts, across):
+        for name in part.observables:
+            series, own = whole.observable(name), part.observable(name)
+            first = np.searchsorted(series.time, part.start)
+            expected = series.value[first : first + len(own)]
+            if accumulates(name, series.value):
+                expected = expected - expected[0]
+            if name != "virial_pressure":
+                np.testing.assert_array_equal(own.value, expected, err_msg=name)
+
+
+def test_displacements_in_a_sheared_window_are_those_of_the_run(simulated):
+    """The periodic images above and below have moved since the start of the run."""
+    sheared = """
+    &box upper = 1, 1 boundary = 'periodic', 'periodic' shear_rate = 2 /
+    &species name = 'gas' count = 20 radius = 0.02 temperature = 1 /
+    &stop time = 3 / &output frames_every_time = 0.25 /
+    """
+    whole = simulated(sheared)
+    window = whole.window(1.3)
+    assert abs(whole.image[-1][:, 1]).max() > 0
+    np.testing.assert_array_equal(window.unwrapped(slice(None)), whole.unwrapped(slice(6, None)))
+    np.testing.assert_array_equal(window.unwrapped(-1), whole.unwrapped(-1))
+
+
+def test_a_window_of_a_window_is_a_window_of_the_run(simulated):
+    whole = simulated(CHANGED)
+    inner, direct = whole.window(0.5).window(0.7, 2.0), whole.window(1.2, 2.5)
+    np.testing.assert_allclose(inner.time, direct.time, atol=1e-12)
+    np.testing.assert_array_equal(inner.velocity[:], direct.velocity[:])
+    np.testing.assert_allclose(inner.observable("work").value, direct.observable("work").value)
+    assert [change.name for change in inner.changes] == [change.name for change in direct.changes]
+    assert inner.restitution == direct.restitution == 0.8
+
+
+#: Settings of which a test draws, for a system with two sides, an obstacle and gravity.
+SETTINGS = [
+    "contact.restitution=0.7",
+    "contact.restitution=",
+    "contact.wall_restitution=0.5",
+    "contact.wall_restitution=",
+    "contact.wall_rule=normal",
+    "contact.tangential_restitution=0.2",
+    "contact.wall_tangential_restitution=-0.5",
+    "box.gravity=0, -1",
+    "box.gravity(1)=1d-1",
+    "box.gravity=2*0.5",
+    "drive.kind='noise' drive.interval=0.1 drive.strength=0.2",
+    "side.left.temperature=2",
+    "side.left.temperature=",
+    "side.right.restitution=0.6",
+    "obstacle.post.temperature=3",
+    "obstacle.post.restitution=0.4",
+    "side.right.motion=constant_velocity side.right.velocity=0.01 side.right.end_time=50",
+    "side.right.motion='still'",
+    "side.top.surface_velocity=1",
+]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_changed_parameters_are_those_of_the_simulation(seed):
+    """The engine keeps its own list of values."""
+    rng = np.random.default_rng(seed)
+    text = BOX.format(start="temperature = 1", end=1) + "&side name = 'left' / "
+    text += "&side name = 'right' / &side name = 'top' /"
+    rough = "restitution = 0.9 tangential_restitution = 0.5"
+    with Simulation(text.replace("restitution = 0.9", rough) if seed % 2 else text) as box:
+        before = box.parameters
+        for k in range(6):
+            box.advance(time=0.01 * (k + 1))
+            chosen = str(rng.choice(SETTINGS)).replace(", ", ",").split(" ")
+            try:
+                box.change(dict(one.split("=", 1) for one in chosen))
+            except package.ProgramError:
+                continue  # such as rotation, which must be present from the start
+        after = box.parameters
+    found = changed(before, changes_in(after.pop("changes", "")))
+    for group in ("box", "contact", "drive"):
+        assert known(found[group]) == known(after[group]), group
+    for side in after["side"]:
+        assert in_both(found["side"][side], after["side"][side])
+    assert in_both(found["obstacle"], after["obstacle"])
+
+
+def in_both(found, expected):
+    """Return whether the values agree; a value that a new rule needs may be listed only once."""
+    found, expected = known(found), known(expected)
+    return all(found[name] == expected[name] for name in found.keys() & expected.keys())
+
+
+def known(values):
+    """Return nested values in a form that can be compared, without missing ones."""
+    if isinstance(values, dict):
+        own = {name: known(value) for name, value in values.items()}
+        return {name: value for name, value in own.items() if value is not None}
+    if isinstance(values, str | bool):
+        return values
+    numbers = [None if value != value else value for value in np.ravel(values).tolist()]
+    return None if set(numbers) <= {None} else numbers
+
+
+def test_values_are_read_as_in_an_input():
+    assert [value_of(text) for text in (".true.", "F", "'a, b'", "noise", "")] == [
+        True,
+        False,
+        "a, b",
+        "noise",
+        None,
+    ]
+    assert value_of(" 1d-3") == 1e-3
+    assert value_of("2*0.5, 1").tolist() == [0.5, 0.5, 1]
+
+
+def test_scripts_and_analyses_take_a_window(simulated, tmp_path, capsys):
+    run = simulated(CHANGED)
+
+    def code_and_text(*options):
+        code = run_script("energy", run.path, "-o", tmp_path / "energy.png", *options)
+        return code, "".join(capsys.readouterr())
+
+    code, text = code_and_text("--times", "1:2")
+    assert code == 0 and code_and_text()[1] != text
+    direct = package.analyse("energy", run.window(1, 2)).table
+    assert package.analyse("energy", run, times="1:2").table == direct
+    wrong = {"5": "is not a window", "7:3": "no window begins", "9:": "only from 0 to 3"}
+    for text, problem in wrong.items():
+        code, told = code_and_text("--times", text)
+        assert code == 2 and problem in told
+    with pytest.raises(RunError, match="no frame"):
+        read_run(run.path).window(3.5)
