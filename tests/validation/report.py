@@ -11,19 +11,19 @@ from .case import Verdict
 
 HEAD = """# Physics validation
 
-How far can the numbers of the program be trusted? This page lists every physics case with its
-reference value, its measured value and a verdict, for researchers who rely on the results. Each
-case runs the program on its own input and compares the result with an exact value, a derived
-formula or published numbers. All values, with their tolerances, are in the file `validation.json`
-beside this page. Both files are written by
+How far can the numbers of the program be trusted? For researchers who rely on the results, this
+page lists all validation cases with their reference values, measured values and verdicts. A
+validation case runs the program on an input of its own and compares the result with an exact value,
+a derived formula or published numbers. All values, with their tolerances, are in the file
+`validation.json` beside this page. Both the page and `validation.json` are written by
 `python tests/validate.py --report docs/explanation/validation`.
 
 The *verdict* is the deviation from the reference divided by the tolerance: a value passes if its
 verdict is at most 1. If the reference is a bound (≤ or ≥), the verdict is 0 if the bound is
-satisfied. The table has one row for each case. If a case has several values, the row shows the one
-that is closest to its tolerance. Values that must agree to rounding (1e-9 or better) have no
-rows of their own. The row of their topic counts them, and
-[the second table](#cases-that-agree-to-rounding) lists them.
+satisfied. The table has one row for each case. If a case has several values, the row shows the
+value that is closest to its tolerance. Values that must agree to rounding (1e-9 or better) have no
+rows of their own. The row of a topic states the number of such values, and [the second
+table](#cases-that-agree-to-rounding) lists them.
 
 The column *source* names the origin of the reference:
 
@@ -71,11 +71,11 @@ TOPICS = {
 NOTES = """
 ## Notes on single cases
 
-Some references are approximate, differ from a publication, or hold only under certain conditions.
-A number in parentheses is the standard error of the last digit.
+The notes concern references that are approximate, differ from a publication, or hold only under
+certain conditions. A number in parentheses is the standard error of the last digit.
 
-**P6-03, relaxation of a mixture.** A published ratio of energies, 1.39(1) after 2 collisions per
-disk, is too low. Other values of this ratio:
+**P6-03, relaxation of a mixture.** The ratio K_heavy / K_light that was published for 2 collisions
+per disk, 1.39(1), is too low. The table lists other values of this ratio:
 
 | method | ratio |
 |---|---|
@@ -85,8 +85,8 @@ disk, is too low. Other values of this ratio:
 | Boltzmann equation | 1.455 |
 
 **P7-07, collision rates of a mixture.** The reference is calculated with approximate contact values
-of the pair distribution functions. For packing 0.1 the table lists the error of these values, to
-first order in the density, and the measured deviation from the reference.
+of the pair distribution functions. For packing 0.1 the table lists the error of the contact values,
+to first order in the density, and the deviation of the measured collision rates from the reference.
 
 | pair | error of the contact value (%) | measured deviation (%) |
 |---|---|---|
@@ -94,39 +94,41 @@ first order in the density, and the measured deviation from the reference.
 | 12 | +0.16 | +0.14(7) |
 | 22 | -0.29 | -0.45(6) |
 
-**P8-03, pressure of a dense fluid.** There is no case P8-03 in the table. Up to packing 0.70 the
-measured pressure agrees with Li et al. (2022) within its errors of 0.03 to 0.2 %.
+**P8-03, pressure of a dense fluid.** The table contains no case P8-03. Up to packing 0.70 the
+measured pressure agrees with Li et al. (2022) within the statistical errors of 0.03 to 0.2 %.
 
-**P8-05, pressure of the crystal.** The formula of the reference is accurate to 0.2 %.
+**P8-05, pressure of the crystal.** The formula for the reference pressure is accurate to 0.2 %.
 
 **P9-07, TC model.** The theoretical fractions of elastic collisions are accurate to 0.01 up to
-packing 0.1. In denser gases the same disks collide repeatedly. With the collision rate w of a disk
-and the contact duration t_c, the fractions are:
+packing 0.1. In denser gases the measured fraction is smaller, because the same disks collide
+repeatedly. The table lists the fractions for several products of the collision rate w of a disk and
+the contact duration t_c:
 
 | w t_c | low packing | packing 0.2 |
 |---|---|---|
 | 1 | 0.86 | 0.850 |
 | 0.5 | 0.62 | 0.612 |
 
-**P10-04, craters without the TC model.** Without the TC model a collapse occurs in all 12 runs
-before the energy has fallen to a tenth. In 7 of them time no longer advances, and the run ends.
+**P10-04, craters without the TC model.** Without the TC model an inelastic collapse occurs in all
+12 runs before the energy has fallen to a tenth of its initial value. In 7 of these runs time no
+longer advances, and the run ends.
 
-**P11-01, energy under gravity.** In the published table the centres of the disks start between R
-and 8. In this program a disk lies completely inside its starting region, so that the region ends at
-8 + R.
+**P11-01, energy under gravity.** In the published table the disks of radius R start with their
+centres between the heights R and 8. In Ricochet a disk lies completely inside its starting region,
+so that the region must end at 8 + R.
 
-**P11-10, time steps.** Time steps miss the fraction P(q) of the collisions, with q = g Δt / s, the
-relative speed g, the time step Δt and the sum s of the radii. The argument is q and not q / 2,
-because a collision is detected only while the disks approach each other. They approach along the
-first half of the path on which they overlap.
+**P11-10, time steps.** Time steps miss the fraction P(q) of the collisions, where q = g Δt / s
+depends on the relative speed g, the time step Δt and the sum s of the radii. The argument of P is q
+and not q / 2, because a collision is detected only while the disks approach each other, which is
+along the first half of the path on which the disks overlap.
 
-**P12-06, diffusion in a Lorentz gas.** The density expansion of D_0/D has the coefficients -4/3,
--0.8775 and 4.519. They are quoted from memory: the papers of van Leeuwen and Weijland could not be
-consulted, and no published simulation was found. Two references are exact: the limit of low
-density, D_0 = 3v/(16nR) from the Boltzmann equation, and the mean free time of P12-05. The table
-compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs of 10^6
-events for each density). The first two terms agree with the measured values within their errors up
-to n R^2 = 0.005. At n R^2 = 0.01 and above, the omitted terms are larger than the errors.
+**P12-06, diffusion in a Lorentz gas.** The coefficients -4/3, -0.8775 and 4.519 of the density
+expansion of D_0/D are quoted from memory, because the papers of van Leeuwen and Weijland could not
+be consulted. No published simulation was found. The limit of low density, D_0 = 3v/(16nR) from the
+Boltzmann equation, and the mean free time of case P12-05 are exact references. The table compares
+the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs of 10^6 events
+for each density). Up to n R^2 = 0.005, the first two terms agree with the measured values within
+the statistical errors. At n R^2 = 0.01 and above, the omitted terms are larger than these errors.
 
 | n R^2 | 0.0025 | 0.005 | 0.01 | 0.02 | 0.04 | 0.08 |
 |---|---|---|---|---|---|---|
@@ -135,12 +137,14 @@ to n R^2 = 0.005. At n R^2 = 0.01 and above, the omitted terms are larger than t
 | expansion without its last term | 0.983 | 0.970 | 0.950 | 0.920 | 0.880 | 0.834 |
 
 **P12-09, Lyapunov exponent of the stadium.** The value 0.43 is quoted from memory, because the
-papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. The estimator
-itself is confirmed by case P12-08, in which the exponent of an unstable path is known exactly. An
-independent program for points (4000 paths of 2000 collisions) found 0.4292(5).
+papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. The estimator of
+the exponent is confirmed by case P12-08, in which the exponent of an unstable path is known
+exactly. An independent program that simulates point particles (4000 paths of 2000 collisions)
+yielded the exponent 0.4292(5).
 
-**P15-09, sheared inelastic gas.** The theory is linear in the stress, and its error grows with the
-inelasticity. The table lists the reduced shear rate, -P_xy and P_yy.
+**P15-09, sheared inelastic gas.** The error of the theory, which is linear in the stress, grows
+with the inelasticity. The cells of the table contain the reduced shear rate, -P_xy and P_yy, in
+this order.
 
 | restitution ξ | theory | measured |
 |---|---|---|
@@ -148,18 +152,19 @@ inelasticity. The table lists the reduced shear rate, -P_xy and P_yy.
 | 0.8 | 0.475, 0.379, 0.826 | 0.490(1), 0.386(1), 0.818(1) |
 
 **P15-13, Maxwell's demon.** The theoretical threshold, a floor velocity of 0.73, is derived for
-many dilute grains. The 120 disks of this case distribute evenly between the chambers above a
-velocity of about 0.65. With 600 disks of a fifth of the diameter, most disks are still in one
-chamber at 0.65.
+many dilute grains. The 120 disks of this case distribute evenly between the chambers if the floor
+velocity is above about 0.65. With 600 disks of a fifth of the diameter, most disks are still in one
+chamber at the floor velocity 0.65.
 
 **P15-20, effusion.** The theoretical rate applies to an opening much narrower than the mean free
-path and than the chamber. The measured rate is 1.9(6) % higher if the opening is 0.05 times as wide
-as the chamber, and 5.4(6) % higher if the opening is also 0.2 mean free paths wide.
+path and than the chamber. The measured rate is 1.9(6) % higher than the theoretical rate if the
+opening is 0.05 times as wide as the chamber, and 5.4(6) % higher if the opening is also 0.2 mean
+free paths wide.
 
-**P15-21, discharge of a hopper.** The tolerance covers the values of the literature, k between 1
-and 2. Since k and the exponent are strongly correlated, each was fitted with the other one fixed.
-Smooth grains do not obey Beverloo's law: for 2000 smooth grains the fitted exponent is 1.29(3),
-with k = 1.3(2).
+**P15-21, discharge of a hopper.** The tolerance covers the values of k in the literature, which lie
+between 1 and 2. Since k and the exponent are strongly correlated, k was fitted with the exponent
+fixed, and the exponent was fitted with k fixed. Smooth grains do not obey Beverloo's law: for 2000
+smooth grains the fitted exponent is 1.29(3), with k = 1.3(2).
 """
 
 
@@ -261,7 +266,7 @@ def outcome(cases: list[dict], seconds: float) -> str:
 ROUNDING = """
 ## Cases that agree to rounding
 
-The table has the columns of the first table, and a column with the number of compared *values*.
+The column *values* states the number of compared values.
 
 | case | quantity | values | source | tolerance | verdict |
 |---|---|---|---|---|---|
@@ -269,36 +274,37 @@ The table has the columns of the first table, and a column with the number of co
 BARS = """
 ## Error bars and p-values
 
-Of 100 correct error bars, 68 contain the true value. How many of the error bars of the scripts
-contain it? The tables of this section, written by `python tests/coverage_tables.py`, give the
-answer. The systems and quantities were chosen before the first run, and the seeds of the tables
-were not used to improve the estimators. Some rows were measured again:
+Of 100 correct error bars, 68 contain the true value on average. The tables of this section, written
+by `python tests/coverage_tables.py`, show how many error bars of the scripts contain the true
+value. The systems and quantities were chosen before the first run, and the seeds of the tables were
+not used to improve the estimators. Some rows were measured again for the following reasons:
 
 - The first tables showed that four errors were wrong: the errors of the flow velocity, of the
-  slopes under gravity, of the coefficients from Helfand moments and of the thermalisation time.
-  Their rows were measured again with corrected estimators.
+  slopes under gravity, of the coefficients from Helfand moments and of the thermalisation time. The
+  rows of these quantities were measured again with corrected estimators.
 - The rows of the Lyapunov exponent and of gases under gravity were repeated after the bias of the
   exponent and the equilibration had been changed.
 
-Curves of cooling gases against time are compared at one fixed time. An error bar belongs to a
-single run, or to a group of runs if the name of the system states a number of runs. The columns
-are:
+Curves of cooling gases as functions of time are compared at one fixed time. An error bar belongs to
+a single run, or to a group of runs if the name of the system states a number of runs. The table has
+the following columns:
 
-- *bars*: number of runs or groups.
-- *coverage*: percentage of the error bars that contain the true value. The true value is
-  either known exactly, or it is the mean over all bars. The expected value is 68 %, and 61 to 75 %
-  are allowed. For n bars the percentage has a standard deviation of 47 / √n by chance.
+- *bars*: number of runs or groups of runs.
+- *coverage*: percentage of the error bars that contain the true value. The true value is either
+  known exactly, or it is the mean over all bars. The expected coverage is 68 %, and 61 to 75 % are
+  allowed. For n error bars the standard deviation of the coverage is 47 / √n %.
 - *error / scatter*: mean error divided by the standard deviation of the measured values. Errors
   with Student's t make this ratio larger than 1.
-- *three*: coverage of means over three values, with errors calculated from the scatter of
-  these values.
+- *three*: coverage of means over three values, with errors calculated from the scatter of these
+  values.
 
-Four rows of the craters are outside the limits. A projectile as light as a disk hits or displaces
-few disks in most beds and many in some: the distribution of these numbers is skewed (skewness 2.2).
-Four values of such a distribution often include no large value; then both their mean and their
-error are too small. For means over more values, drawn at random from 240 craters, the coverage is
-better: 64 % for 16 values, and 67 % for 64 values. The exponents are calculated from these
-numbers, and the errors of the exponents are too small for the same reason.
+In four rows of the craters, the coverage is outside the allowed range. A projectile as light as a
+disk hits or displaces few disks in most beds and many disks in some beds, so that the distribution
+of the number of disks is skewed (skewness 2.2). A sample of four values from such a distribution
+often includes no large value; both the mean and the error of the sample are then too small. For
+means over more values, drawn at random from 240 craters, the coverage is better: 64 % for 16
+values, and 67 % for 64 values. The errors of the exponents, which are calculated from the numbers
+of disks, are too small for the same reason.
 
 | system | quantity | bars | coverage | error / scatter | three |
 |---|---|---|---|---|---|
@@ -306,9 +312,9 @@ numbers, and the errors of the exponents are too small for the same reason.
 P_VALUES = """
 The second table lists p-values of `speeds.py` for runs to which the tested law applies. Of 100
 p-values, 5 should be below 0.05 and 32 below 0.32. *KS* stands for the Kolmogorov-Smirnov test of
-the speeds, and χ² for the χ² test. *Uniform* is the p-value of a Kolmogorov-Smirnov test of these
-p-values against the uniform distribution. The seeds of the mixtures begin at 20001, all other seeds
-at 1001.
+the speeds, and χ² for the χ² test. *Uniform* is the p-value of a Kolmogorov-Smirnov test that
+compares the distribution of the p-values in this row with the uniform distribution. The seeds of
+the mixtures begin at 20001, all other seeds at 1001.
 
 | system | species | runs | KS: < .05 | < .32 | uniform | χ²: < .05 | < .32 | uniform |
 |---|---|---|---|---|---|---|---|---|
