@@ -25,9 +25,10 @@ import argparse
 from ricochet import Run, drawing
 from ricochet.analysis.thermodynamics import packing
 from ricochet.figures.drawing import plt
+from ricochet.figures.sheet import CM, STACKED, text_style, title_letters, width_of, wrap
 from ricochet.reading.units import UNNAMED
 from ricochet.reports.options import chosen_frames, frame_list
-from ricochet.script import command_line, launch, report
+from ricochet.script import add_width, command_line, launch, report
 
 import numpy as np
 from matplotlib.quiver import Quiver
@@ -65,11 +66,21 @@ def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
     axes.quiverkey(arrows, 0.9, 1 + height, speed, words, **place)
 
 
+def lines(text: str, letters: float) -> str:
+    """Split a title into lines of a number of letters, unless there is space for any title."""
+    return text if np.isinf(letters) else "\n".join(wrap(text, letters))
+
+
 def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> plt.Figure:
     """Draw a picture of the disks for each frame."""
     aspect = drawing.aspect_of(run)
     rows, columns = drawing.panel_grid(len(frames), aspect)
     width = min(10.5, (6.0 if len(frames) == 1 else 3.4) * columns) / columns
+    if args.width:
+        size = width_of(args.width)[0]
+        rows, columns = (len(frames), 1) if size < STACKED else (rows, columns)
+        width = (size * CM - 0.9) / columns
+    letters = title_letters(width) if args.width else np.inf
     figure, panels = plt.subplots(
         rows, columns, squeeze=False, figsize=(width * columns + 0.9, width * aspect * rows + 0.7)
     )
@@ -101,7 +112,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         if colour != "species" and args.per_frame:
             beyond = drawing.exceeded(values[k], norm.vmin, norm.vmax)
             figure.colorbar(disks, ax=axes, shrink=0.7, extend=beyond, **bar)
-        axes.set_title(drawing.moment(run, frames[k]))
+        axes.set_title(lines(drawing.moment(run, frames[k]), letters))
         if args.quiver:
             seen = run.in_box(frames[k])
             vectors = (*run.position[frames[k]][seen].T, *run.velocity[frames[k]][seen].T)
@@ -118,7 +129,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
     fluid = not run.nature & {"gravity", "obstacles", "open"} and run.n_disks > 1
     dense = f",  η = {packing(run):.4g}" if fluid else ""
     larger = drawing.note_on_size(panels.flat[0], run)
-    figure.suptitle(drawing.caption([run]) + dense + larger)
+    figure.suptitle(lines(drawing.caption([run]) + dense + larger, columns * letters))
     return figure
 
 
@@ -128,11 +139,13 @@ def main() -> None:
     parser.add_argument("--quiver", action="store_true", help="draw velocities as arrows")
     parser.add_argument("--log", action="store_true", help="use a logarithmic colour scale")
     parser.add_argument("--per-frame", action="store_true", help="a colour scale for each frame")
+    add_width(parser, "that of the pictures")
     args = parser.parse_args()
     (run,) = args.runs
     which = args.frames or (None if args.count else frame_list("-1"))
     frames = chosen_frames(run, which, args.count)
-    figure = draw(run, frames, drawing.chosen_colour(run, args.colour), args)
+    with plt.style.context(text_style(args.width)):
+        figure = draw(run, frames, drawing.chosen_colour(run, args.colour), args)
     rows = []
     for frame in frames:
         row = {"frame": frame, **drawing.count_at(run, frame), "time": float(run.time[frame])}

@@ -8,6 +8,9 @@ the run has a frame at every event (output.frames_every_events = 1).  Several ru
 side.
 """
 
+import argparse
+from typing import Any
+
 from ricochet import Run, RunError
 from ricochet.figures.drawing import (
     COLOURS,
@@ -19,11 +22,15 @@ from ricochet.figures.drawing import (
     note_on_size,
     plt,
 )
+from ricochet.figures.sheet import CM, LINE, STACKED, text_style, title_letters, width_of, wrap
 from ricochet.reports.options import chosen_disks, chosen_frames
-from ricochet.script import command_line, launch, report
+from ricochet.script import add_width, command_line, launch, report
 
 import numpy as np
 from matplotlib.patches import Circle
+
+MARGIN = 0.35  # width of the axis labels of a panel [inches]
+GAP = 0.15  # gap between rows of panels [inches]
 
 
 def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
@@ -86,10 +93,15 @@ def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) ->
         axes.plot(*path[0], marker="x", color=colour, zorder=4)
         axes.add_patch(Circle(path[-1], sizes[disk] / 2, color=colour, lw=0, zorder=0.9))
     lines = "" if has_every_event(run, frames) else ",  lines join frames"
-    axes.set_title(
-        f"{run.parameter('run', 'title') or run.path.stem}\n{caption([run])}{lines}\n"
+    letters = title_letters(axes.figure.get_figwidth() / axes.get_gridspec().ncols - MARGIN)
+    titles = (
+        f"{run.parameter('run', 'title') or run.path.stem}",
+        f"{caption([run])}{lines}",
         f"t = {run.time[frames[0]]:.4g} (crosses) to {run.time[frames[-1]]:.4g} (disks)"
         f"{note_on_size(axes, run)}",
+    )
+    axes.set_title(
+        "\n".join(line for title in titles for line in wrap(title, letters)),
         parse_math=False,
         pad=18,  # above the labels of the walls
     )
@@ -97,11 +109,23 @@ def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) ->
 
 def main() -> None:
     parser = command_line(__doc__, "trajectory.png", frames=None, count=None, disks=None)
+    add_width(parser, "13cm for each run")
     args = parser.parse_args()
+    with plt.style.context(text_style(args.width)):
+        figure, rows = draw(args)
+    report(args, figure, rows)
+
+
+def draw(args: argparse.Namespace) -> tuple[plt.Figure, list[dict[str, Any]]]:
+    """Draw the paths of all runs side by side; return also the rows of the table."""
     size, rows = len(args.runs), []
     tallest = min(max(map(aspect_of, args.runs)), 2.0)
-    height = 4.85 * tallest + 1.15  # the title has three lines
-    figure, panels = plt.subplots(1, size, squeeze=False, figsize=(5.2 * size, height))
+    paper = width_of(args.width)[0] if args.width else 0.0
+    columns = 1 if 0 < paper < STACKED else size
+    width, below = (paper * CM / columns if paper else 5.2), size // columns
+    height = (width - MARGIN) * tallest + 1.15  # the title has three lines
+    shape = {"squeeze": False, "figsize": (width * columns, height * below)}
+    figure, panels = plt.subplots(below, columns, **shape)
     for axes, run in zip(panels.flat, args.runs, strict=True):
         frames = chosen_frames(run, args.frames, args.count)
         disks = chosen_disks(run, args.disks or list(range(1, 1 + min(12, run.n_disks))))
@@ -112,7 +136,11 @@ def main() -> None:
         for disk, places in zip(disks, ends, strict=True):
             row = {"run": run.path.name, "disk": disk + 1, "frames": len(frames)}
             rows.append(row | dict(zip(names, places, strict=True)))
-    report(args, figure, rows)
+    longest = max(axes.get_title("left").count("\n") + 1 for axes in panels.flat)
+    line = plt.rcParams["axes.titlesize"] * LINE / 72  # [inches]
+    more = line * max(0, longest - 3) + (GAP if args.width else 0)
+    figure.set_figheight(below * (height + more))
+    return figure, rows
 
 
 if __name__ == "__main__":

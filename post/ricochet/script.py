@@ -144,6 +144,12 @@ def command_line(
     return parser
 
 
+def add_width(parser: argparse.ArgumentParser, default: str) -> None:
+    """Add the option --width, whose default is described in words, to the parser of a script."""
+    meaning = f"width of the figure, such as 8.5cm, or slide for a projector [{default}]"
+    parser.add_argument("--width", metavar="WIDTH", help=meaning)
+
+
 # --- printed tables, warnings and figures ---
 
 
@@ -195,8 +201,7 @@ def run_analysis(name: str, doc: str) -> None:
     parser = command_line(doc, f"{name}.png", one=own.single, repeated=own.repeated)
     parser.set_defaults(paired=own.unfinished)
     parser.add_argument("--panel", metavar="NAME", help="panel to draw alone [all panels]")
-    paper = "width of the figure, such as 8.5cm, or slide for a projector [16cm]"
-    parser.add_argument("--width", metavar="WIDTH", help=paper)
+    add_width(parser, "16cm")
     part = "only the times from START up to END, as a run of the laws then in force; 20: has no END"
     parser.add_argument("--times", type=time_window, metavar="START:END", help=part)
     for option in own.options:

@@ -332,17 +332,25 @@ def test_the_scale_of_arrows_is_beside_or_above_the_title(tmp_path, rng, figures
     assert not figure._suptitle.get_window_extent().overlaps(key.text.get_window_extent())
 
 
+@pytest.mark.parametrize("width", [None, 8.5, 16])
 @pytest.mark.parametrize(("count", "edges"), [(1, (1, 1)), (2, (1, 1)), (2, (1, 2)), (3, (2, 1))])
-def test_titles_and_labels_of_paths_are_inside_the_figure(tmp_path, rng, figures, count, edges):
+def test_titles_and_labels_of_paths_are_inside_the_figure(
+    tmp_path, rng, figures, count, edges, width
+):
     paths = []
     for k in range(count):
         x = rng.uniform(0.2, 0.8, (2, 3, 2)) * edges
         paths.append(write_run(tmp_path / f"{k}.h5", x, x, edges=edges, radius=0.01))
-    assert run_script("trajectory", *paths, "-o", tmp_path / "a.png") == 0
-    (figure,) = figures
-    (x0, y0), (x1, y1) = figure.get_tightbbox().get_points()
-    width, height = figure.get_size_inches()
-    assert min(x0, y0) >= 0 and x1 <= width and y1 <= height
+    words = ["--width", f"{width}cm"] if width else []
+    assert run_script("trajectory", *paths, "-o", tmp_path / "a.png", *words) == 0
+    chosen = ["--frames", ",".join("01"[:count])]
+    assert run_script("snapshot", paths[0], "-o", tmp_path / "b.png", *words, *chosen) == 0
+    for figure in figures:
+        figure.draw_without_rendering()
+        (x0, y0), (x1, y1) = figure.get_tightbbox().get_points()
+        size = figure.get_size_inches()
+        assert min(x0, y0) >= 0 and x1 <= size[0] and y1 <= size[1]
+        assert not width or size[0] == pytest.approx(width / 2.54)
 
 
 def test_the_title_of_paths_says_when_lines_are_not_the_exact_path(tmp_path, figures, simulated):

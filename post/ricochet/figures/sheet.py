@@ -228,6 +228,16 @@ def width_of(text: float | str | None) -> tuple[float, bool]:
     return width, False
 
 
+def title_letters(width: float) -> float:
+    """Return the number of letters of a title that fit into a width [inches]."""
+    return width / CM * LETTERS * SMALLEST / plt.rcParams["axes.titlesize"]
+
+
+def text_style(width: float | str | None) -> dict[str, Any]:
+    """Return the sizes of text in a figure of the given width; without a width, keep the style."""
+    return {} if width is None else sizes_of_text(SLIDE if width_of(width)[1] else 1.0)
+
+
 def sizes_of_text(scale: float) -> dict[str, Any]:
     """Return the sizes of text in a figure: 9 points on paper, 8 points for legends and ticks."""
     names = "font.size", "axes.labelsize", "axes.titlesize", "figure.titlesize"
