@@ -75,15 +75,15 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
     """Draw a picture of the disks for each frame."""
     aspect = drawing.aspect_of(run)
     rows, columns = drawing.panel_grid(len(frames), aspect)
-    width = min(10.5, (6.0 if len(frames) == 1 else 3.4) * columns) / columns
+    width, apart = min(10.5, (6.0 if len(frames) == 1 else 3.4) * columns) / columns, 0.0
+    letters = np.inf
     if args.width:
         size = width_of(args.width)[0]
         rows, columns = (len(frames), 1) if size < STACKED else (rows, columns)
-        width = (size * CM - 0.9) / columns
-    letters = title_letters(width) if args.width else np.inf
-    figure, panels = plt.subplots(
-        rows, columns, squeeze=False, figsize=(width * columns + 0.9, width * aspect * rows + 0.7)
-    )
+        width, apart = (size * CM - 0.9) / columns, 0.5  # [inches]
+        letters = title_letters(width)
+    shape = (width * columns + 0.9, (width * aspect + apart) * rows + 0.7)
+    figure, panels = plt.subplots(rows, columns, squeeze=False, figsize=shape)
     if colour != "species":
         values = np.array([drawing.values_of(run, frame, colour) for frame in frames])
         whole = scale(values, args.log, colour)
