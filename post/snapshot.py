@@ -26,12 +26,10 @@ from ricochet import Run, drawing
 from ricochet.analysis.thermodynamics import packing
 from ricochet.figures.drawing import plt
 from ricochet.figures.sheet import CM, STACKED, text_style, title_letters, width_of, wrap
-from ricochet.reading.units import UNNAMED
 from ricochet.reports.options import chosen_frames, frame_list
 from ricochet.script import add_width, command_line, launch, report
 
 import numpy as np
-from matplotlib.quiver import Quiver
 from matplotlib.colors import LogNorm, Normalize, to_rgba_array
 
 
@@ -45,25 +43,6 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
         return Normalize(0, drawing.top_of(moved))
     low, top = np.quantile(moved, (0.005, 0.995))
     return LogNorm(min(low, top / 1.01), top)
-
-
-def draw_key(axes: plt.Axes, run: Run, arrows: Quiver, longest: float) -> None:
-    """Draw a reference arrow above a panel, labelled with the speed that it represents.
-
-    The arrow is placed above the title of the panel if both do not fit side by side.
-    """
-    power = 10.0 ** np.floor(np.log10(longest))
-    speed = max(step * power for step in (1, 2, 5) if step * power <= longest)
-    unit = run.units.name("speed")
-    words = f"speed {speed:g}" + f" {unit}" * (unit != UNNAMED.name("speed"))
-    place = {"coordinates": "axes", "labelpos": "W", "color": "black"}
-    title = axes.get_title("left")
-    panel, size = axes.get_window_extent(), axes.title.get_fontsize() * axes.figure.dpi / 72
-    beside = 0.6 * size * len(title + words) < 0.75 * panel.width  # 0.6: width of a character
-    if not beside:
-        axes.set_title(f"\n{title}")
-    height = 0.04 if beside else 0.03 + 1.5 * size / panel.height
-    axes.quiverkey(arrows, 0.9, 1 + height, speed, words, **place)
 
 
 def lines(text: str, letters: float) -> str:
@@ -121,7 +100,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
             drawn = axes.quiver(*vectors, **arrows)
             drawn.set_in_layout(False)  # arrows beyond the walls need no room
             if k == 0:
-                draw_key(axes, run, drawn, longest)
+                drawing.draw_key(axes, run, drawn, longest)
     drawing.species_legend(figure, run, by_outline=colour != "species")
     if colour != "species" and not args.per_frame:
         beyond = drawing.exceeded(values, whole.vmin, whole.vmax)

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
+from matplotlib.quiver import Quiver
 
 from ..analysis.estimates import Estimate, kurtosis_noise
 from ..analysis.structure import bond_order, periods
@@ -27,6 +28,7 @@ from ..reading.files import RunError, destination, did_you_mean
 from ..reading.nature import known, rows_of, stays_in_box
 from ..reading.box import groups_of_rows
 from ..reading.reader import SIDES, Run
+from ..reading.units import UNNAMED
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
@@ -446,6 +448,25 @@ def species_legend(figure: Figure, run: Run, by_outline: bool = False) -> None:
     handles = [Line2D([], [], ls="", marker="o", **style) for style in styles]
     if len(run.names) > 1:
         figure.legend(handles, run.names, loc="outside lower center", ncols=len(run.names))
+
+
+def draw_key(axes: Axes, run: Run, arrows: Quiver, longest: float) -> None:
+    """Draw a reference arrow above a panel, labelled with the speed that it represents.
+
+    The arrow is placed above the title of the panel if both do not fit side by side.
+    """
+    power = 10.0 ** np.floor(np.log10(longest))
+    speed = max(step * power for step in (1, 2, 5) if step * power <= longest)
+    unit = run.units.name("speed")
+    words = f"speed {speed:g}" + f" {unit}" * (unit != UNNAMED.name("speed"))
+    place = {"coordinates": "axes", "labelpos": "W", "color": "black"}
+    title = axes.get_title("left")
+    panel, size = axes.get_window_extent(), axes.title.get_fontsize() * axes.figure.dpi / 72
+    beside = 0.6 * size * len(title + words) < 0.75 * panel.width  # 0.6: width of a character
+    if not beside:
+        axes.set_title(f"\n{title}")
+    height = 0.04 if beside else 0.03 + 1.5 * size / panel.height
+    axes.quiverkey(arrows, 0.9, 1 + height, speed, words, **place)
 
 
 def warn(figure: Figure, notes: Sequence[str]) -> None:
