@@ -461,7 +461,7 @@ def draw_key(axes: Axes, run: Run, arrows: Quiver, longest: float) -> None:
     words = f"speed {speed:g}" + f" {unit}" * (unit != UNNAMED.name("speed"))
     place = {"coordinates": "axes", "labelpos": "W", "color": "black"}
     title = axes.get_title("left")
-    panel, size = axes.get_window_extent(), axes.title.get_fontsize() * axes.figure.dpi / 72
+    panel, size = axes.get_window_extent(), float(axes.title.get_fontsize()) * axes.figure.dpi / 72
     beside = 0.6 * size * len(title + words) < 0.75 * panel.width  # 0.6: width of a character
     if not beside:
         axes.set_title(f"\n{title}")
