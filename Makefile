@@ -60,7 +60,8 @@ objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(fi
 objects_in = $(patsubst %.f90,$(BUILD)/%.o,$(notdir $(wildcard $(1:%=src/%/*.f90))))
 # The modules of the event loop and of random insertion, which are optimised as a whole. Those of its folders that it calls seldom or
 # never are compiled like the others.
-seldom := motions changes clusters collapses stop_rules observables sample_values obstacle_cells time_stepped verlet_list recycle drives
+seldom := motions changes clusters collapses rest standstill stop_rules observables sample_values obstacle_cells time_stepped \
+  verlet_list recycle drives
 hot_objects := $(filter-out $(seldom:%=$(BUILD)/%.o),$(call objects_in,dynamics parallel drives sides laws physics search geometry)) \
   $(patsubst %,$(BUILD)/%.o,random_insertion random_stream sorting memory_hints memory_hints_c)
 cold_objects := $(call objects_in,. input variables output files)

@@ -20,11 +20,12 @@ module library
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
+  use standstill, only: collapse_note, report_rest
   use stop_rules, only: coldness, stop_rule_t
   use system, only: seconds
   use team, only: make_team
   use texts, only: eol, growing_text_t, lines_of, text_t, written, written_exactly
-  use timeline, only: adapted_iterations, advance_once, collapse_note, report_rest
+  use timeline, only: adapted_iterations, advance_once
   use variable_help, only: input_of, quoted
   use variables, only: change_of, in_motion, obstacle_groups, row_of
   implicit none

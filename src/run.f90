@@ -4,7 +4,6 @@ module run
   use sampling_schedule, only: progress_t
   use checkpoint, only: read_checkpoint, recall_overrides
   use command_line, only: command_t
-  use epochs, only: stays_at_rest
   use errors, only: error_t, exit_broken, exit_files, exit_finished, exit_stopped, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
@@ -15,17 +14,19 @@ module run
   use output, only: estimate_size, output_t
   use partners, only: n_sides
   use progress_line, only: progress_line_t
+  use rest, only: stays_at_rest
   use run_files, only: is_file, source_of, unfinished
   use run_input, only: read_input
   use run_setup, only: choose_evolution, new_simulation, start_threads
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
+  use standstill, only: collapse_note, report_rest
   use stop_rules, only: coldness, stop_rule_t
   use signals, only: checkpoint_requests, end_at_signals, stop_requested, watch_signals
   use system, only: folder_of, is_folder, print_text, seconds
   use tally, only: dissipated, drive_energy
   use texts, only: counted, eol, legible, size_text, written
-  use timeline, only: adapted_iterations, advance_once, collapse_note, report_rest
+  use timeline, only: adapted_iterations, advance_once
   implicit none
   private
   public :: perform_run

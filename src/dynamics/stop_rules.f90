@@ -9,8 +9,8 @@
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use entries, only: awaits_entry
-  use epochs, only: has_come_to_rest, is_at_rest, stands_still
   use evolution, only: evolution_t, limits_t
+  use rest, only: has_come_to_rest, is_at_rest, stands_still
   use simulation_state, only: simulation_t
   use tally, only: dissipated
   use timeline, only: next_action
