@@ -21,9 +21,9 @@ a derived formula or published numbers. All values, with their tolerances, are i
 The *verdict* is the deviation from the reference divided by the tolerance: a value passes if its
 verdict is at most 1. If the reference is a bound (≤ or ≥), the verdict is 0 if the bound is
 satisfied. The table has one row for each case. If a case has several values, the row shows the
-value that is closest to its tolerance. Values that must agree to rounding (1e-9 or better) have no
-rows of their own. The row of a topic states the number of such values, and [the second
-table](#cases-that-agree-to-rounding) lists them.
+value that is closest to its tolerance. Values that must agree with the reference to rounding (1e-9
+or better) have no rows of their own. The row of a topic states the number of such values, and [the
+second table](#cases-that-agree-to-rounding) lists them.
 
 The column *source* names the origin of the reference:
 
@@ -95,7 +95,7 @@ to first order in the density, and the deviation of the measured collision rates
 | 22 | -0.29 | -0.45(6) |
 
 **P8-03, pressure of a dense fluid.** The table contains no case P8-03. Up to packing 0.70 the
-measured pressure agrees with Li et al. (2022) within the statistical errors of 0.03 to 0.2 %.
+measured pressure agrees with the pressure of Li et al., 2022, within the errors of 0.03 to 0.2 %.
 
 **P8-05, pressure of the crystal.** The formula for the reference pressure is accurate to 0.2 %.
 
@@ -277,7 +277,8 @@ BARS = """
 Of 100 correct error bars, 68 contain the true value on average. The tables of this section, written
 by `python tests/coverage_tables.py`, show how many error bars of the scripts contain the true
 value. The systems and quantities were chosen before the first run, and the seeds of the tables were
-not used to improve the estimators. Some rows were measured again for the following reasons:
+not used to improve the estimators. Some rows of the tables were measured again for the following
+reasons:
 
 - The first tables showed that four errors were wrong: the errors of the flow velocity, of the
   slopes under gravity, of the coefficients from Helfand moments and of the thermalisation time. The
