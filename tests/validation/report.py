@@ -117,10 +117,10 @@ longer advances, and the run ends.
 centres between the heights R and 8. In Ricochet a disk lies completely inside its starting region,
 so that the region must end at 8 + R.
 
-**P11-10, time steps.** Time steps miss the fraction P(q) of the collisions, where q = g Δt / s
-depends on the relative speed g, the time step Δt and the sum s of the radii. The argument of P is q
-and not q / 2, because a collision is detected only while the disks approach each other, which is
-along the first half of the path on which the disks overlap.
+**P11-10, time steps.** Time steps miss the fraction P(q) of the collisions, where q = g Δt / s, g
+is the relative speed, Δt the time step and s the sum of the radii. The argument of P is q and not q
+/ 2, because a collision is detected only while the disks approach each other. Overlapping disks
+approach each other along the first half of the path on which they overlap.
 
 **P12-06, diffusion in a Lorentz gas.** The coefficients -4/3, -0.8775 and 4.519 of the density
 expansion of D_0/D are quoted from memory, because the papers of van Leeuwen and Weijland could not
@@ -157,9 +157,9 @@ velocity is above about 0.65. With 600 disks of a fifth of the diameter, most di
 chamber at the floor velocity 0.65.
 
 **P15-20, effusion.** The theoretical rate applies to an opening much narrower than the mean free
-path and than the chamber. The measured rate is 1.9(6) % higher than the theoretical rate if the
-opening is 0.05 times as wide as the chamber, and 5.4(6) % higher if the opening is also 0.2 mean
-free paths wide.
+path and than the chamber. For an opening 0.05 times as wide as the chamber, the measured rate is
+1.9(6) % higher than the theoretical rate. If the opening is also 0.2 mean free paths wide, the
+measured rate is 5.4(6) % higher.
 
 **P15-21, discharge of a hopper.** The tolerance covers the values of k in the literature, which lie
 between 1 and 2. Since k and the exponent are strongly correlated, k was fitted with the exponent
