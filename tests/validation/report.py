@@ -75,7 +75,8 @@ The notes concern references that are approximate, differ from a publication, or
 certain conditions. A number in parentheses is the standard error of the last digit.
 
 **P6-03, relaxation of a mixture.** The ratio K_heavy / K_light that was published for 2 collisions
-per disk, 1.39(1), is too low. The table lists other values of this ratio:
+per disk, 1.39(1), is too low. The table lists other values of the ratio after 2 collisions per
+disk:
 
 | method | ratio |
 |---|---|
@@ -299,13 +300,13 @@ the following columns:
 - *three*: coverage of means over three values, with errors calculated from the scatter of these
   values.
 
-In four rows of the craters, the coverage is outside the allowed range. A projectile as light as a
+In four rows about craters, the coverage is outside the allowed range. A projectile as light as a
 disk hits or displaces few disks in most beds and many disks in some beds, so that the distribution
 of the number of disks is skewed (skewness 2.2). A sample of four values from such a distribution
 often includes no large value; both the mean and the error of the sample are then too small. For
 means over more values, drawn at random from 240 craters, the coverage is better: 64 % for 16
-values, and 67 % for 64 values. The errors of the exponents, which are calculated from the numbers
-of disks, are too small for the same reason.
+values, and 67 % for 64 values. The exponents are calculated from the numbers of disks. Because of
+the skewed distribution, the errors of the exponents are too small as well.
 
 | system | quantity | bars | coverage | error / scatter | three |
 |---|---|---|---|---|---|
