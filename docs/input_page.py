@@ -22,18 +22,19 @@ GROUPS = {
     "box": "The group `&box` sets the size of the box, its boundaries, gravity and shear "
     "([theory](../../explanation/theory.md#sheared-boxes)).",
     "side": "A group `&side` describes the motion of one side of the box that is a wall "
-    "([theory](../../explanation/theory.md#sides-that-move)). For its collision rule see "
-    "[boundaries](boundaries.md).",
+    "([theory](../../explanation/theory.md#sides-that-move)). The collision rule of a side is set "
+    "by the variables of [boundaries](boundaries.md).",
     "obstacle": "A group `&obstacle` describes a circular obstacle or an arc, or many of them from "
-    "a file, and may be repeated. For its collision rule see [boundaries](boundaries.md).",
+    "a file, and may be repeated. The collision rule of an obstacle is set by the variables of "
+    "[boundaries](boundaries.md).",
     "wall": "A group `&wall` describes a straight wall, a polyline, or many walls from a file, and "
-    "may be repeated. Disks bounce off both faces of a wall and off its end points. For its "
-    "collision rule see [boundaries](boundaries.md).",
-    LAW: "The groups `&side`, `&obstacle` and `&wall` share these variables, which describe the "
-    "collisions of disks with one boundary. For a boundary without them, the `wall_...` variables "
-    "of [`&contact`](contact.md) apply.",
-    "species": "A group `&species` describes disks of one kind. It is repeated for each species, "
-    "and an input file needs at least one "
+    "may be repeated. Disks bounce off both faces of a wall and off its end points. The collision "
+    "rule of a wall is set by the variables of [boundaries](boundaries.md).",
+    LAW: "The groups `&side`, `&obstacle` and `&wall` share the following variables, which "
+    "describe the collisions of disks with one boundary. If the group of a boundary does not "
+    "contain them, the `wall_...` variables of [`&contact`](contact.md) apply.",
+    "species": "A group `&species` describes disks of one kind. The group is repeated for each "
+    "species, and an input file needs at least one species "
     "([initial configurations](../../explanation/theory.md#starting-states)).",
     "contact": "The group `&contact` sets the collision rules of disks, and of boundaries without "
     "rules of their own ([theory](../../explanation/theory.md#contact)).",
@@ -44,9 +45,10 @@ GROUPS = {
     "the box through an open side (`open` of [`&side`](side.md)).",
     "change": "A group `&change` describes a change of the system at a given time, and may be "
     "repeated ([changes during a run](../../guides/changes.md)).",
-    "stop": "The group `&stop` sets the rules that end the run. At least one is needed, and the "
-    "run ends when the first of them is met. If no further event can occur and no `time` is given, "
-    "the run ends at the last collision, or at the next sample after this collision.",
+    "stop": "The group `&stop` sets the rules that end the run. At least one stop rule is needed, "
+    "and the run ends when the first of the given rules is met. If no further event can occur and "
+    "no `time` is given, the run ends at the last collision, or at the next sample after this "
+    "collision.",
     "output": "The group `&output` determines the contents of the output file and the times of "
     "frames and samples. The initial and the final state are always written. Averages over samples "
     "at intervals of collisions or events differ from time averages by a relative amount of order "
@@ -72,13 +74,14 @@ EXAMPLES = {
 HEAD = """\
 # Input: every variable
 
-Look up a variable of an input file here. [input/README](../../input/README.md) explains the format
-and shows how to describe a system; [input/reference.nml](../../input/reference.nml) contains all
-variables with their defaults. The command `ricochet --explain VARIABLE` prints the same text for
-one variable, and `--explain WORD` searches names, choices and explanations.
+The pages below describe every variable of an input file. [input/README](../../input/README.md)
+explains the format of the file and shows how to describe a system. The file
+[input/reference.nml](../../input/reference.nml) contains all variables with their defaults. The
+command `ricochet --explain VARIABLE` prints the description of one variable, and `--explain WORD`
+searches names, choices and descriptions.
 
-A file consists of groups `&name ... /` with lines `variable = value`. Only values that differ from
-the default are needed. The input file determines the units of length, time and mass
+An input file consists of groups `&name ... /` with lines `variable = value`. Only values that
+differ from the default are needed. The input file determines the units of length, time and mass
 ([units](../explanation/glossary.md#units)). On the command line `--set` replaces a value:
 
 | option | replaces |
@@ -88,16 +91,15 @@ the default are needed. The input file determines the units of length, time and 
 | `--set 'box.gravity(2)=-5'` | one element of a vector, by its number |
 
 For each variable a table lists the allowed values with their unit, the default, and an example if
-there is no default. Three more rows appear where they apply:
+there is no default. The table of a variable can also contain the following rows:
 
-- *applies with*: the choice of another variable that is required for this variable to have an
-  effect;
-- *excludes*: variables that cannot be combined with this one;
+- *applies with*: the choice of another variable without which this variable has no effect;
+- *excludes*: variables that cannot be combined with this variable;
 - *may change*: on `--resume` (variables without an effect on the trajectory), or while a
-  simulation runs (by `&change`, in Python and on the laboratory page). All other variables are
-  fixed during a run.
+  simulation runs (by `&change`, in Python and on the laboratory page). If this row is missing, the
+  variable is fixed during a run.
 
-`docs/input_page.py` generates these pages from the table in the program.
+`docs/input_page.py` generates the pages on variables from the table in the program.
 
 ## Groups
 

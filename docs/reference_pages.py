@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 C_HEAD = """\
 # C interface
 
-Programs in C, or in any language that can call C, can contain the engine as a library.
+Programs in C, or in any language that can call C, can use the engine as a library.
 `make library` builds `build/libricochet.so` and `build/libricochet_files.so`.
 `docs/reference_pages.py` generates this page from the header `ricochet.h`.
 
@@ -32,9 +32,9 @@ Programs in C, or in any language that can call C, can contain the engine as a l
 INPUTS_HEAD = """\
 # Inputs
 
-Choose an experiment to start from: each file in `input/` is ready to run, and its comments explain
-the settings. The pictures show the simulations at one time; `make lab` shows them in motion.
-`docs/reference_pages.py` generates this page.
+All files in `input/` are listed here. An input file is ready to run, and comments in the file
+explain the settings. The pictures show the simulations at one time; `make lab` shows the
+simulations in motion. `docs/reference_pages.py` generates this page.
 
 """
 

@@ -35,19 +35,19 @@
            return status;
        }
 
-   A handle represents an open simulation. Any number of simulations may be open at the same time, but each must be used
-   by only one thread at a time. The functions print nothing, do not handle signals, and end the process only if no memory
-   is left.
+   A handle represents an open simulation. Any number of simulations may be open at the same time, but a handle must be
+   used by only one thread at a time. The functions print nothing, do not handle signals, and end the process only if no
+   memory is left.
 
    Lengths, times, masses and energies are in the units of the input. Disks are in the order of the input.
 
-   `message` is a buffer of `room` bytes for an error message, including its terminating zero. A longer message is
-   truncated. Exit codes are 0 for success, 2 for invalid input, 3 for a file that cannot be read or written, and 4 for an
+   `message` is a buffer of `room` bytes for an error message and its terminating zero. Longer messages are truncated.
+   Exit codes are 0 for success, 2 for invalid input, 3 for a file that cannot be read or written, and 4 for an
    aborted simulation. Negative counts and negative values of `room` are treated as 0.
 
-   libricochet.so does not require HDF5. libricochet_files.so additionally contains ricochet_save and ricochet_load, and its
-   ricochet_open accepts species that start from the output file of a run. A handle returned by one of the two libraries
-   can be passed to functions of the other. */
+   The library libricochet.so does not require HDF5. The library libricochet_files.so additionally contains ricochet_save
+   and ricochet_load, and its version of ricochet_open accepts species that start from the output file of a run. A handle
+   returned by one of the two libraries can be passed to functions of the other library. */
 #ifndef RICOCHET_H
 #define RICOCHET_H
 #include <stdint.h>
@@ -71,7 +71,7 @@ void ricochet_close(ricochet *);
 /* Advances a simulation until one of three limits is reached: a time, a number of disk-disk collisions, or a number of
    events, all counted from the start of the run. INFINITY and INT64_MAX represent no limit. Without any limit, the stop
    rule of the input applies, if it contains one. A limit on collisions or events is reached exactly: the simulation may
-   stop between simultaneous events, and the next call executes the remaining ones. In a time-stepped simulation the limit
+   stop between simultaneous events, and the next call executes the remaining events. In a time-stepped simulation the limit
    may be exceeded, because a step is always completed. The results do not depend on the number of calls.
    Returns 0 when a limit is reached, 1 if `patience` seconds have passed before (call the function again), or an exit code:
    2 if `time` is NAN, other codes if the simulation cannot be continued. */
@@ -112,8 +112,8 @@ int ricochet_observables(ricochet *, char *names, int room, double *values);
 
 /* Changes forces, contact laws and motions at the present time.
    overrides:  lines GROUP.VARIABLE=VALUE for box.gravity, drive, contact, side, source, wall and obstacle
-   A side starts its new motion at its present position. Variables of its former motion that the new motion does not have
-   are dropped. The change of the total energy counts as work. Returns an exit code; if it is not 0, nothing is changed. */
+   A side starts its new motion at its present position. Variables that only the former motion of the side uses are
+   dropped. The change of the total energy counts as work. Returns an exit code; if it is not 0, nothing is changed. */
 int ricochet_change(ricochet *, const char *overrides, char *message, int room);
 
 /* Schedules a change at a later time, like a group &change in the input.
@@ -150,15 +150,15 @@ int ricochet_text(ricochet *, const char *what, char *text, int room);
    most:     maximum number of events
    records:  for each event, the time, i and j, and the magnitude and the two components of the momentum change of disk i,
              as in the event log of a run
-   Returns the number of predicted events. This number is less than `most` if no event occurs for a long time. Returns
-   -1 in a time-stepped simulation, which cannot predict events. */
+   Returns the number of predicted events, which is less than `most` if no event occurs for a long time. In a
+   time-stepped simulation, which cannot predict events, the function returns -1. */
 int ricochet_next_events(ricochet *, int most, double records[][6]);
 
 /* --- Only in libricochet_files.so --- */
 
 /* Saves a simulation as the unfinished output of a run stopped at the present time. The command
-   `ricochet INPUT -o OUT.h5 --resume` continues this run. The file contains the samples of the initial state only or, after
-   a change, the samples of the present state only.
+   `ricochet INPUT -o OUT.h5 --resume` continues this run. The saved file contains only the samples of the initial state
+   or, after a change, only the samples of the present state.
    path:   path of the finished output, OUT.h5; the saved file is OUT.h5.part
    force:  nonzero to replace an existing output
    Returns an exit code. */

@@ -16,8 +16,8 @@ module andersen
       //"the given probability (fraction).")]
   type(variable_t), parameter :: rows(*) = [ &
     variable_t("drive", "fraction", "real", 1, "required", "0.1", &
-      "Probability that a kick changes the velocity of a given disk. Divided by interval, it is the collision frequency of " &
-      //"the Andersen thermostat.", part_of_all, goes_with="kind "//word, may_change=in_motion)]
+      "Probability that a kick changes the velocity of a given disk. The collision frequency of the Andersen thermostat is this " &
+      //"probability divided by interval.", part_of_all, goes_with="kind "//word, may_change=in_motion)]
 
   type, extends(brownian_t) :: andersen_t
     real(real64) :: fraction = 1.0_real64        !! probability that a disk is affected by a kick

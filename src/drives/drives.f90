@@ -36,9 +36,9 @@ module drives
       goes_with="kind "//kinds, may_change=in_motion), &
     noise_rows, andersen_rows, &
     variable_t("drive", "temperature", "real", 1, "required", "1", &
-      "Temperature kT of the Maxwell distribution from which kicks draw new velocities. The temperature 0 is allowed with " &
-      //"kind = 'active'; disks then move at their self-propulsion velocity alone. With kind = 'recycle', either temperature " &
-      //"or velocity must be given.", not_negative, "energy", &
+      "Temperature kT of the Maxwell distribution from which kicks draw new velocities. The temperature 0 is allowed with kind = " &
+      //"'active'. At this temperature disks move at their self-propulsion velocity alone. With kind = 'recycle', either " &
+      //"temperature or velocity must be given.", not_negative, "energy", &
       goes_with="kind "//with_temperature, may_change=in_motion, &
       otherwise="none; must be given where it applies, or velocity instead if kind is 'recycle'"), &
     recycle_rows, active_rows, &

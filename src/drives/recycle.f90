@@ -20,8 +20,8 @@ module recycle
 
   character(len=*), parameter :: word = "recycle", count_word = "recycled"
   type(choice_t), parameter :: choices(*) = [ &
-    choice_t("kind", word, "Recycling, as in a hopper that is refilled: each disk in from_region moves to a random free " &
-      //"position in to_region, with a new velocity. Displacements are not defined in such a run.")]
+    choice_t("kind", word, "Recycling, as in a hopper that is refilled: each disk in from_region moves to a random free position " &
+      //"in to_region, with a new velocity. Displacements are not defined in a run with recycling.")]
   type(choice_t), parameter :: count_choice = &
     choice_t("frame_columns", count_word, "Number of times that each disk has been recycled (drive.kind = 'recycle').")
   type(variable_t), parameter :: rows(*) = [ &
@@ -32,12 +32,12 @@ module recycle
     variable_t("drive", "from_region", "real", 4, "required", "0, 1, 0, 0.1", &
       "Region (xlo, xhi, ylo, yhi) from which disks are recycled. At all multiples of the time interval, each disk with its " &
       //"centre in this region moves to a random free position in to_region, in the order of the ids. If none of 100 random " &
-      //"positions is free for a disk, it stays where it is until the next multiple.", &
+      //"positions is free for a disk, the disk stays where it is until the next multiple.", &
       unit="length", goes_with="kind "//word, may_change=in_motion), &
     variable_t("drive", "to_region", "real", 4, "required", "0, 1, 0.9, 1", &
-      "Region (xlo, xhi, ylo, yhi) to which recycled disks move. Recycled disks lie completely inside this region. Only " &
-      //"along a periodic axis that the region spans, they may overlap its edges. The region must not overlap from_region, " &
-      //"an obstacle or a straight wall.", &
+      "Region (xlo, xhi, ylo, yhi) to which recycled disks move. Recycled disks lie completely inside this region. Only along a " &
+      //"periodic axis that the region spans may recycled disks overlap its edges. The region must not overlap from_region, an " &
+      //"obstacle or a straight wall.", &
       unit="length", goes_with="kind "//word, may_change=in_motion)]
 
   type, extends(drive_t) :: recycle_t

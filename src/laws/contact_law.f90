@@ -18,16 +18,17 @@ module contact_law
   type(variable_t), parameter :: contact_time_row = &
     variable_t("contact", "contact_time", "real", 1, "default", "0", &
       "Contact duration t_c of the TC model, which prevents inelastic collapse: a collision is elastic if one of its partners " &
-      //"collided less than t_c ago. 0 switches the model off. Choose t_c far below the mean time between collisions and, for " &
-      //"grains of diameter d resting under gravity g, below sqrt(d/g). The model does not prevent the collapse of resting " &
-      //"grains with friction or with a tangential restitution between -1 and 1: these dissipate energy even in such elastic " &
-      //"collisions. Not available with stop.at_rest.", &
+      //"collided less than t_c ago. With t_c = 0 the model is switched off. Choose t_c far below the mean time between " &
+      //"collisions and, for grains of diameter d resting under gravity g, below sqrt(d/g). The model does not prevent the " &
+      //"collapse of resting grains with friction or with a tangential restitution between -1 and 1, because such grains " &
+      //"dissipate energy even in these elastic collisions. Not available with stop.at_rest.", &
       not_negative, "time", may_change=in_motion)
 
   type(variable_t), parameter :: inertia_row = &
     variable_t("contact", "inertia", "real", 1, "default", "0.5", &
-      "Moment of inertia of a disk in units of mass times radius squared: 0.5 for a uniform disk, 1 for a ring. Matters only " &
-      //"for rotating disks: with rough disks or boundaries, or with initial angular velocities.", moment, may_change=in_motion)
+      "Moment of inertia of a disk in units of mass times radius squared: 0.5 for a uniform disk, 1 for a ring. The value " &
+      //"matters only for rotating disks, that is, with rough disks or boundaries, or with initial angular velocities.", &
+      moment, may_change=in_motion)
 
   type(variable_t), parameter :: pair_restitution_row = &
     variable_t("contact", "pair_restitution", "real", 0, "optional", "1, 0.9, 0.9, 0.8", &

@@ -21,17 +21,18 @@ module restitution_law
     choice_t("restitution_law", "viscoelastic", "Viscoelastic bodies: below reference_speed, the coefficient of restitution " &
       //"is e = 1 - y + 3/5 y**2, where y is proportional to g**(1/5) and g is the impact speed. The coefficients " &
       //"of restitution in the input must be at least 7/12."), &
-    choice_t("restitution_law", "elastic_below", "Collisions at impact speeds below reference_speed are elastic. Smooth disks " &
-      //"then never undergo inelastic collapse, and never come to rest.")]
+    choice_t("restitution_law", "elastic_below", "Collisions at impact speeds below reference_speed are elastic. With this law " &
+      //"smooth disks never undergo inelastic collapse, and never come to rest.")]
 
   type(variable_t), parameter :: restitution_law_rows(*) = [ &
     variable_t("contact", "restitution_law", "text", 1, "default", "'constant'", &
       "Dependence of all coefficients of restitution on the impact speed g, the normal component of the relative velocity.", &
       choices=restitution_laws, may_change=in_motion), &
     variable_t("contact", "reference_speed", "real", 1, "required", "1", &
-      "Reference value g0 of the impact speed. Above g0 the coefficients of restitution have the values in the input; below " &
-      //"g0 they are closer to 1, or equal to 1 with restitution_law = 'elastic_below'. With 'power' and 'viscoelastic', " &
-      //"choose g0 above the impact speeds that occur; with 'elastic_below', choose g0 well below them.", &
+      "Reference value g0 of the impact speed. At impact speeds above g0 the coefficients of restitution have the values in the " &
+      //"input. At impact speeds below g0 the coefficients are closer to 1, or equal to 1 with restitution_law = " &
+      //"'elastic_below'. With 'power' and 'viscoelastic', choose g0 above the impact speeds that occur; with 'elastic_below', " &
+      //"choose g0 well below these speeds.", &
       positive, "length/time", goes_with="restitution_law power viscoelastic elastic_below", may_change=in_motion)]
 
   !> Coefficient of restitution that approaches 1 at small impact velocities (Ramirez, Poschel,

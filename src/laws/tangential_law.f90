@@ -10,16 +10,16 @@ module tangential_law
   !> Variables of disk-disk collisions.
   type(variable_t), parameter :: tangential_rows(*) = [ &
     variable_t("contact", "tangential_restitution", "real", 1, "default", "-1", &
-      "Coefficient of tangential restitution of disk-disk collisions: -1 for smooth surfaces, 0 if collisions stop the slip, " &
-      //"1 if they reverse it. Above -1 the disks are rough and rotate. Values between -1 and 1 dissipate energy even in " &
-      //"collisions that the TC model (contact_time) makes elastic. Grains resting in a dense bed then collapse or collide " &
-      //"millions of times; use -1 or 1 for such grains.", &
+      "Coefficient of tangential restitution of disk-disk collisions: -1 for smooth surfaces, 0 if collisions stop the slip, 1 " &
+      //"if they reverse it. Above -1 the disks are rough and rotate. Values between -1 and 1 dissipate energy even in " &
+      //"collisions that the TC model (contact_time) makes elastic. With such values, grains resting in a dense bed collapse or " &
+      //"collide millions of times; use -1 or 1 for these grains.", &
       tangential, may_change=in_motion), &
     variable_t("contact", "friction", "real", 1, "optional", "0.3", &
       "Coulomb friction coefficient of disk-disk collisions: upper limit of the ratio of tangential to normal impulse. Needs " &
       //"rough disks (tangential_restitution > -1). Friction dissipates energy even in collisions that the TC model " &
-      //"(contact_time) makes elastic. Grains resting in a dense bed then collapse or collide millions of times; use " &
-      //"tangential_restitution = 1 without friction for such grains.", &
+      //"(contact_time) makes elastic. With friction, grains resting in a dense bed collapse or collide millions of times; use " &
+      //"tangential_restitution = 1 without friction for these grains.", &
       not_negative, may_change=in_motion, &
       otherwise="the tangential impulse has no limit")]
 

@@ -16,9 +16,9 @@ module wall_law
   !> Meanings of the rules. They apply to the variable `rule` of a single wall and to the variable
   !> `wall_rule` of all walls.
   type(choice_t), parameter :: meanings(*) = [ &
-    choice_t("", "velocity", "Both components of the velocity are multiplied by the coefficient of restitution, and the " &
-      //"normal component is reversed. A single disk without gravity follows the same path as in elastic collisions, at " &
-      //"decreasing speed."), &
+    choice_t("", "velocity", "A collision with the boundary multiplies both components of the velocity by the coefficient of " &
+      //"restitution, and reverses the normal component. A single disk without gravity follows the same path as in elastic " &
+      //"collisions, at decreasing speed."), &
     choice_t("", "normal", "The normal component of the velocity is reversed and multiplied by the coefficient of " &
       //"restitution. The tangential component does not change (smooth wall), unless tangential_restitution makes the wall " &
       //"rough.")]
@@ -42,17 +42,17 @@ module wall_law
   !> Variables that the groups `&side`, `&obstacle` and `&wall` have in common.
   type(variable_t), parameter :: law_rows(*) = [ &
     variable_t("", "restitution", "real", 1, "optional", "0.9", &
-      "Coefficient of restitution of disks colliding with this boundary: 1 is elastic, 0 perfectly inelastic. The rule " &
-      //"determines whether it applies to both components of the velocity or only to the normal component. Not available for " &
-      //"a thermal boundary (temperature).", unit_interval, &
+      "Coefficient of restitution of disks colliding with this boundary: 1 is elastic, 0 perfectly inelastic. The collision rule " &
+      //"(rule) determines whether the coefficient applies to both components of the velocity or only to the normal component. " &
+      //"Not available for a thermal boundary (temperature).", unit_interval, &
       may_change=in_motion, otherwise="contact.wall_restitution"), &
     variable_t("", "rule", "text", 1, "optional", "'normal'", &
       "Collision rule of this boundary. Not available for a thermal boundary (temperature).", choices=wall_rules, &
       may_change=in_motion, otherwise="contact.wall_rule"), &
     own_tangential_rows, &
     variable_t("", "temperature", "real", 1, "optional", "1", &
-      "Temperature kT of a thermal boundary. Disks leave it with random velocities, as if they came from a gas at this " &
-      //"temperature. A thermal boundary can slide (surface_velocity), but has no restitution and cannot move.", &
+      "Temperature kT of a thermal boundary. Disks leave a thermal boundary with random velocities, as if they came from a gas " &
+      //"at this temperature. A thermal boundary can slide (surface_velocity), but has no restitution and cannot move.", &
       positive, "energy", excludes="restitution rule tangential_restitution friction motion", may_change=in_motion, &
       otherwise="none; the boundary is not thermal"), &
     variable_t("", "surface_velocity", "real", 1, "fallback", "0", &

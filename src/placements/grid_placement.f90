@@ -17,7 +17,7 @@ module grid_placement
     choice_t("placement", word, "Rectangular grid that fills the region, with the numbers of columns and rows in grid.")]
   type(variable_t), parameter :: rows(*) = [ &
     variable_t("species", "grid", "integer", 2, "required", "10, 10", &
-      "Numbers of columns and rows of the rectangular grid. The number of disks is their product.", &
+      "Numbers of columns and rows of the rectangular grid. The number of disks is the product of these two numbers.", &
       count_of_disks, &
       goes_with="placement "//word)]
 

@@ -45,9 +45,8 @@ module motions
       unit="length", goes_with="motion "//with_position, &
       otherwise="the coordinate in box.lower or box.upper"), &
     variable_t("side", "velocity", "real", 1, "required", "1", &
-      "Velocity of the side, positive inwards. With motion = 'sawtooth' it is the velocity with which the side strikes " &
-      //"disks, and must be greater than 0. With motion = 'constant_velocity' negative values move the side " &
-      //"outwards.", unit="length/time", &
+      "Velocity of the side, positive inwards. With motion = 'sawtooth' the side strikes disks with this velocity, which must be " &
+      //"greater than 0. With motion = 'constant_velocity' negative values move the side outwards.", unit="length/time", &
       goes_with="motion "//with_velocity, may_change=in_motion), &
     stroke_rows, piston_rows]
 

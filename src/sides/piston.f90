@@ -18,7 +18,7 @@ module piston
       "Mass of the piston. Gravity does not act on the piston.", &
       positive, "mass", goes_with="motion "//word, may_change=in_motion), &
     variable_t("side", "force", "real", 1, "required", "1", &
-      "Constant inward force on the piston. Divided by the length of the side, it is the external pressure.", &
+      "Constant inward force on the piston. The external pressure is this force divided by the length of the side.", &
       not_negative, "energy/length", goes_with="motion "//word, may_change=in_motion)]
 
   !> A piston whose `reach` is the width of the box.

@@ -11,12 +11,12 @@ module boundary_variables
     variable_t("box", "lower", "real", 2, "default", "0, 0", &
       "Lower left corner (x, y) of the box.", unit="length"), &
     variable_t("box", "upper", "real", 2, "default", "1, 1", &
-      "Upper right corner (x, y) of the box. Both coordinates must exceed those of box.lower.", unit="length"), &
+      "Upper right corner (x, y) of the box. The coordinates must exceed those of box.lower.", unit="length"), &
     variable_t("box", "boundary", "text", 2, "default", "'wall', 'wall'", &
       "Kind of boundary along x (left and right side), then along y (bottom and top side).", &
       choices="wall periodic"), &
     variable_t("box", "gravity", "real", 2, "default", "0, 0", &
-      "Uniform acceleration (x, y) of all disks. Its component along a periodic axis must be 0. Not available with " &
+      "Uniform acceleration (x, y) of all disks. The component along a periodic axis must be 0. Not available with " &
       //"box.shear_rate or output.helfand.", unit="length/time**2", may_change=in_motion), &
     variable_t("box", "shear_rate", "real", 1, "default", "0", &
       "Shear rate: gradient along y of the flow velocity along x, imposed by Lees-Edwards boundary conditions. Needs " &
@@ -25,14 +25,15 @@ module boundary_variables
 
   type(variable_t), parameter :: side_rows(*) = [ &
     variable_t("side", "name", "text", 1, "example", "'bottom'", &
-      "Side of the box to which the group applies; it must be a wall (box.boundary). Each side has at most one group.", &
+      "Side of the box to which the group applies. The side must be a wall (box.boundary), and there must be only one group for " &
+      //"it.", &
       choices="left right bottom top"), &
     variable_t("side", "open", "logical", 1, "default", ".false.", &
-      "Open side: a disk leaves the box when its centre reaches the side. It then waits outside until a source (&source) " &
-      //"lets it in again. While the initial state is generated, the side counts as a wall. The collision rule of the side " &
-      //"acts only while the side is closed. An open side cannot move. Sides can be opened or closed in a running simulation " &
-      //"if the input contains a source, waiting disks, a &change of open, or a side with this variable. A side cannot be " &
-      //"closed while a disk overlaps it.", may_change=in_motion), &
+      "Open side: a disk leaves the box when its centre reaches the side. A disk that has left waits outside until a source " &
+      //"(&source) lets it in again. While the initial state is generated, the side counts as a wall. The collision rule of the " &
+      //"side acts only while the side is closed. An open side cannot move. Sides can be opened or closed in a running " &
+      //"simulation if the input contains a source, waiting disks, a &change of open, or a side with this variable. A side " &
+      //"cannot be closed while a disk overlaps it.", may_change=in_motion), &
     motion_rows]
 
   type(variable_t), parameter :: obstacle_rows(*) = [ &
@@ -54,8 +55,8 @@ module boundary_variables
       first_angle, &
       "degrees", excludes="side", otherwise="none; the obstacle is a whole circle"), &
     variable_t("obstacle", "to_angle", "real", 1, "optional", "180", &
-      "Angle at which the arc ends, at most 360 degrees larger than from_angle. The arc runs counter-clockwise from " &
-      //"from_angle to to_angle. Disks pass through the gap between its ends if it is wide enough.", last_angle, "degrees", &
+      "Angle at which the arc ends, at most 360 degrees larger than from_angle. The arc runs counter-clockwise from from_angle " &
+      //"to to_angle. Disks pass through the gap between the ends of the arc if the gap is wide enough.", last_angle, "degrees", &
       excludes="side", otherwise="none; the obstacle is a whole circle"), &
     variable_t("obstacle", "file", "text", 1, "optional", "'scatterers.txt'", &
       "File with many circles, given instead of centre and radius: a text file with a line of column names (x y radius) and " &

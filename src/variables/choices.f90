@@ -15,9 +15,9 @@ module choices
 
   type(choice_t), parameter :: list(*) = [ &
     choice_t("dynamics", "events", "Event-driven: exact motion from one collision to the next, without a time step."), &
-    choice_t("dynamics", "steps", "Time-stepped, for comparison: all disks move for a time step dt, then overlapping pairs " &
-      //"collide. Collisions are up to one step late, and short contacts can be missed. Not available with box.shear_rate or " &
-      //"a piston."), &
+    choice_t("dynamics", "steps", "Time-stepped, for comparison: all disks move for a time step dt, and then overlapping pairs " &
+      //"collide. Collisions take place up to one step too late, and short contacts can be missed. Not available with " &
+      //"box.shear_rate or a piston."), &
     choice_t("search", "cells", "Search in the 3 x 3 cells around a disk, or in neighbour lists if disks of very different " &
       //"sizes crowd the cells. The cost per event does not depend on the number N of disks."), &
     choice_t("search", "pairs", "Search among all disks, at a cost of O(N) per event."), &
@@ -35,7 +35,7 @@ module choices
     choice_t("name", "top", "Side at the largest y."), &
     motion_choices, &
     choice_t("side", "outside", "Disks bounce off the outside of the circle."), &
-    choice_t("side", "inside", "The circle is a container that encloses all disks. It has no periodic images."), &
+    choice_t("side", "inside", "The circle is a container that encloses all disks. A container has no periodic images."), &
     rule_choices, &
     choice_t("radius_distribution", "uniform", "Uniform distribution about the mean radius."), &
     choice_t("radius_distribution", "gaussian", "Gaussian distribution about the mean radius."), &
@@ -46,7 +46,7 @@ module choices
     placement_choices, &
     choice_t("velocities", "rest", "All disks start at rest."), &
     choice_t("velocities", "equal_speed", "All disks have the same speed, in random directions."), &
-    choice_t("velocities", "uniform", "Both components are uniformly distributed between -speed and speed."), &
+    choice_t("velocities", "uniform", "Velocity components are uniformly distributed between -speed and speed."), &
     choice_t("velocities", "maxwell", "Velocities are drawn from the Maxwell distribution with kT = temperature."), &
     choice_t("velocities", "explicit", "Velocities listed in velocity."), &
     choice_t("velocities", "file", "Velocities in the initial-configuration file (file), and angular velocities if the file " &

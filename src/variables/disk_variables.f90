@@ -16,23 +16,23 @@ module disk_variables
       "Number of disks of the species.", count_of_disks, &
       otherwise="follows from grid, position or file; needed without these"), &
     variable_t("species", "waiting", "integer", 1, "default", "0", &
-      "Number of disks waiting outside the box at the start: the last disks of the species. Only the other disks have " &
-      //"initial positions and velocities. Waiting disks enter through a source (&source). The packing fraction includes " &
-      //"them. With an initial-configuration file (file), mass and radius must also be given.", not_negative), &
+      "Number of disks waiting outside the box at the start, which are the last disks of the species. Only the other disks have " &
+      //"initial positions and velocities. Waiting disks enter through a source (&source). The packing fraction includes the " &
+      //"waiting disks. With an initial-configuration file (file), mass and radius must also be given.", not_negative), &
     variable_t("species", "mass", "real", 1, "default", "1", &
-      "Mass of each disk. With relative_to, a multiple of the mass of the other species. With mass_scaling = 'area', the " &
-      //"mass of a disk with the mean radius. If mass is not given, masses are read from the initial-configuration file " &
-      //"(file), provided that the file contains masses.", &
+      "Mass of each disk. With relative_to, the value is a multiple of the mass of the other species. With mass_scaling = " &
+      //"'area', the value is the mass of a disk with the mean radius. If mass is not given, masses are read from the " &
+      //"initial-configuration file (file), provided that the file contains masses.", &
       positive, "mass"), &
     variable_t("species", "radius", "real", 1, "example", "0.01", &
-      "Radius of each disk; mean radius of a polydisperse species. With relative_to, a multiple of the radius of the other " &
-      //"species (default 1). Unless radii are read from the initial-configuration file (file), the input must contain " &
+      "Radius of each disk, or mean radius of a polydisperse species. With relative_to, the value is a multiple of the radius of " &
+      //"the other species (default 1). Unless radii are read from the initial-configuration file (file), the input must contain " &
       //"radius, packing_fraction or relative_to.", &
       positive, "length", otherwise="follows from packing_fraction, relative_to or file; needed without " &
       //"these"), &
     variable_t("species", "packing_fraction", "real", 1, "optional", "0.3", &
-      "Packing fraction: total area of the disks of the species divided by the area of their region. It determines the " &
-      //"radius.", &
+      "Packing fraction: total area of the disks of the species divided by the area of their region. The radius is calculated " &
+      //"from the packing fraction.", &
       fraction, excludes="radius relative_to", otherwise="none; the radius is given in another " &
       //"way"), &
     variable_t("species", "radius_distribution", "text", 1, "optional", "'gaussian'", &
@@ -42,20 +42,21 @@ module disk_variables
       //"lognormal", &
       otherwise="'uniform' if polydispersity is given; else all radii are equal"), &
     variable_t("species", "polydispersity", "real", 1, "required", "0.2", &
-      "Polydispersity: standard deviation of the radii divided by their mean. At most 0.47 for the uniform, 0.27 for the " &
-      //"Gaussian and 0.39 for the lognormal distribution. Not available for radii read from an initial-configuration file " &
-      //"(file).", &
+      "Polydispersity: standard deviation of the radii divided by their mean. The largest value is 0.47 for the uniform, 0.27 " &
+      //"for the Gaussian and 0.39 for the lognormal distribution. Not available for radii read from an initial-configuration " &
+      //"file (file).", &
       spread_of_radii, goes_with="radius_distribution uniform gaussian lognormal"), &
     variable_t("species", "mass_scaling", "text", 1, "fallback", "'equal'", &
       "Dependence of the mass of a disk on its radius, in a polydisperse species.", choices="equal area", &
       goes_with="radius_distribution uniform gaussian lognormal"), &
     variable_t("species", "relative_to", "text", 1, "optional", "'bed'", &
       "Species relative to which mass and radius are given: with relative_to = 'bed', mass = 25 means 25 times the mass of a " &
-      //"disk of the species 'bed'. If that species is polydisperse, radius is relative to its mean radius. Its radii must " &
-      //"not be read from an initial-configuration file.", &
+      //"disk of the species 'bed'. If the species 'bed' is polydisperse, radius is relative to its mean radius. The radii of " &
+      //"the species 'bed' must not be read from an initial-configuration file.", &
       otherwise="none; mass and radius are absolute values"), &
     variable_t("species", "region", "real", 4, "optional", "0, 1, 0, 0.5", &
-      "Rectangle (xlo, xhi, ylo, yhi) inside which the disks lie at the start. They may leave it later.", unit="length", &
+      "Rectangle (xlo, xhi, ylo, yhi) inside which the disks lie at the start. During the run the disks may leave this region.", &
+      unit="length", &
       otherwise="the whole box"), &
     placement_rows, &
     variable_t("species", "velocities", "text", 1, "default", "'rest'", &
@@ -71,8 +72,9 @@ module disk_variables
       //"drawn velocities fluctuates about this value, unless exact_temperature is given.", not_negative, "energy", &
       goes_with="velocities maxwell"), &
     variable_t("species", "exact_temperature", "real", 1, "optional", "1", &
-      "Exact initial temperature kT of the species: velocities v relative to its centre of mass are scaled so that the sum of " &
-      //"m v**2 over its N disks is 2N kT. Applies to all methods (velocities) except 'rest'. Needs at least two disks.", &
+      "Exact initial temperature kT of the species: velocities v relative to its centre of mass are scaled so that the sum of m " &
+      //"v**2 over its N disks is 2N kT. The scaling applies to all methods (velocities) except 'rest', and needs at least two " &
+      //"disks.", &
       not_negative, "energy", &
       otherwise="none; velocities are not scaled"), &
     variable_t("species", "velocity", "real", 0, "required", "1, 0", &

@@ -18,16 +18,16 @@ module run_variables
     variable_t("run", "dynamics", "text", 1, "default", "'events'", &
       "Algorithm that advances the simulation in time.", choices="events steps"), &
     variable_t("run", "dt", "real", 1, "optional", "0.001", &
-      "Time step of time-stepped dynamics (run.dynamics = 'steps'). Choose it so small that no disk moves by more than half " &
-      //"the smallest radius in one step.", &
+      "Time step of time-stepped dynamics (run.dynamics = 'steps'). Choose the time step so small that no disk moves by more " &
+      //"than half the smallest radius in one step.", &
       positive, "time", &
       otherwise="none; needed with run.dynamics = 'steps'"), &
     variable_t("run", "search", "text", 1, "default", "'cells'", &
-      "Method that finds collision partners. All methods give bit-identical trajectories and differ only in speed; 'pairs' " &
-      //"and 'rescan' exist for comparison.", choices="cells pairs rescan", may_change=on_resume), &
+      "Method that finds collision partners. The trajectories are bit-identical with all methods; 'pairs' and 'rescan' are " &
+      //"slower and exist for comparison.", choices="cells pairs rescan", may_change=on_resume), &
     variable_t("run", "queue", "text", 1, "default", "'calendar'", &
-      "Priority queue of the predicted events. Both queues give bit-identical trajectories; 'heap' exists for comparison. No " &
-      //"effect with run.dynamics = 'steps'.", choices="calendar heap", may_change=on_resume), &
+      "Priority queue of the predicted events. The trajectories are bit-identical with both queues; 'heap' exists for " &
+      //"comparison. The variable has no effect with run.dynamics = 'steps'.", choices="calendar heap", may_change=on_resume), &
     variable_t("run", "threads", "integer", 1, "default", "0", &
       "Largest number of threads (cores) of the run. With 0 the number is read from the environment variable " &
       //"OMP_NUM_THREADS; if this variable is not set, the number is 1. The trajectory is bit-identical for any number of " &
@@ -41,8 +41,8 @@ module run_variables
       "Name of the change in messages and in --set change.NAME.VARIABLE=VALUE: up to 40 letters, digits, _ and -. The names " &
       //"of all changes must differ.", may_change=on_resume, otherwise="1, 2, ... in the order of the file"), &
     variable_t("change", "time", "real", 1, "example", "1", &
-      "Time of the change. The change takes place after the collisions and before the kicks and samples of the same time. " &
-      //"With run.dynamics = 'steps', it takes place at the end of the step that contains this time. Times after the end of " &
+      "Time of the change. The change takes place after the collisions and before the kicks and samples of the same time. With " &
+      //"run.dynamics = 'steps', the change takes place at the end of the step that contains this time. Times after the end of " &
       //"the run are allowed.", &
       positive, "time", may_change=on_resume), &
     variable_t("change", "set", "text", 0, "example", "'box.gravity=0, -1'", &
@@ -71,14 +71,15 @@ module run_variables
       "Number of disks in the box at which the run ends. The run ends when a disk leaves through an open side (side.open) " &
       //"and at most this number of disks remains.", not_negative, may_change=on_resume, otherwise="no limit"), &
     variable_t("stop", "energy_fraction", "real", 1, "optional", "0.1", &
-      "Fraction of the initial kinetic energy at which the run ends. The remaining energy is the initial kinetic energy " &
-      //"minus all energy dissipated in collisions. Needs inelastic collisions or a second stop rule. Not available with " &
+      "Fraction of the initial kinetic energy at which the run ends. The remaining energy is the initial kinetic energy minus " &
+      //"all energy dissipated in collisions. This rule needs inelastic collisions or a second stop rule. Not available with " &
       //"driving, with shear, or with thermal, sliding or moving boundaries.", &
       energy_left, may_change=on_resume, otherwise="no limit"), &
     variable_t("stop", "at_rest", "logical", 1, "optional", ".true.", &
-      "End of the run when all disks have come to rest. With box.gravity, a disk comes to rest when its sequence of ever " &
-      //"shorter bounces has converged; without gravity, when it no longer moves. Needs inelastic collisions. Not available " &
-      //"with run.dynamics = 'steps', contact.contact_time, driving, shear, or thermal, sliding or moving boundaries.", &
+      "End of the run when all disks have come to rest. With box.gravity, a disk comes to rest when its sequence of ever shorter " &
+      //"bounces has converged; without gravity, a disk is at rest when it no longer moves. This rule needs inelastic " &
+      //"collisions. Not available with run.dynamics = 'steps', contact.contact_time, driving, shear, or thermal, sliding or " &
+      //"moving boundaries.", &
       may_change=on_resume, &
       otherwise=".false.: disks at rest do not end the run"), &
     variable_t("stop", "wall_clock", "real", 1, "optional", "3600", &
@@ -143,9 +144,9 @@ module run_variables
     variable_t("output", "event_log", "logical", 1, "default", ".false.", &
       "Event log: time, partners and change of momentum of every event, written to the group /events of the output file."), &
     variable_t("output", "virial_tensor", "logical", 1, "default", ".false.", &
-      "Output of the observables virial_tensor and kinetic_tensor, from which the pressure tensor (stress tensor) follows. " &
-      //"They are always written for rotating disks, in sheared or driven systems, with thermal, sliding or moving " &
-      //"boundaries, and with helfand = .true. In other systems they slow the run down slightly."), &
+      "Output of the observables virial_tensor and kinetic_tensor, from which the pressure tensor (stress tensor) follows. The " &
+      //"two tensors are always written for rotating disks, in sheared or driven systems, with thermal, sliding or moving " &
+      //"boundaries, and with helfand = .true. In other systems this output slows the run down slightly."), &
     variable_t("output", "helfand", "logical", 1, "default", ".false.", &
       "Accumulation of the Helfand moments of momentum and energy, from which transport.py calculates shear viscosity, bulk " &
       //"viscosity and thermal conductivity. Not available with box.gravity or box.shear_rate."), &
