@@ -22,8 +22,8 @@ The *verdict* is the deviation from the reference divided by the tolerance: a va
 verdict is at most 1. If the reference is a bound (≤ or ≥), the verdict is 0 if the bound is
 satisfied. The table has one row for each case. If a case has several values, the row shows the
 value that is closest to its tolerance. Values that must agree with the reference to rounding (1e-9
-or better) have no rows of their own. The row of a topic states the number of such values, and [the
-second table](#cases-that-agree-to-rounding) lists them.
+or better) have no rows of their own. The row of a topic states how many values agree to rounding,
+and [the second table](#cases-that-agree-to-rounding) lists them.
 
 The column *source* names the origin of the reference:
 
@@ -111,7 +111,7 @@ the contact duration t_c:
 | 0.5 | 0.62 | 0.612 |
 
 **P10-04, craters without the TC model.** Without the TC model an inelastic collapse occurs in all
-12 runs before the energy has fallen to a tenth of its initial value. In 7 of these runs time no
+12 runs before the energy has fallen to a tenth of its initial value. In 7 of the 12 runs time no
 longer advances, and the run ends.
 
 **P11-01, energy under gravity.** In the published table the disks of radius R start with their
@@ -129,7 +129,8 @@ be consulted. No published simulation was found. The limit of low density, D_0 =
 Boltzmann equation, and the mean free time of case P12-05 are exact references. The table compares
 the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs of 10^6 events
 for each density). Up to n R^2 = 0.005, the first two terms agree with the measured values within
-the statistical errors. At n R^2 = 0.01 and above, the omitted terms are larger than these errors.
+the statistical errors. At n R^2 = 0.01 and above, the omitted terms are larger than the statistical
+errors.
 
 | n R^2 | 0.0025 | 0.005 | 0.01 | 0.02 | 0.04 | 0.08 |
 |---|---|---|---|---|---|---|
@@ -283,7 +284,7 @@ reasons:
 
 - The first tables showed that four errors were wrong: the errors of the flow velocity, of the
   slopes under gravity, of the coefficients from Helfand moments and of the thermalisation time. The
-  rows of these quantities were measured again with corrected estimators.
+  rows of the four quantities were measured again with corrected estimators.
 - The rows of the Lyapunov exponent and of gases under gravity were repeated after the bias of the
   exponent and the equilibration had been changed.
 
@@ -296,13 +297,13 @@ the following columns:
   known exactly, or it is the mean over all bars. The expected coverage is 68 %, and 61 to 75 % are
   allowed. For n error bars the standard deviation of the coverage is 47 / √n %.
 - *error / scatter*: mean error divided by the standard deviation of the measured values. Errors
-  with Student's t make this ratio larger than 1.
+  with Student's t make the ratio larger than 1.
 - *three*: coverage of means over three values, with errors calculated from the scatter of these
   values.
 
 In four rows about craters, the coverage is outside the allowed range. A projectile as light as a
 disk hits or displaces few disks in most beds and many disks in some beds, so that the distribution
-of the number of disks is skewed (skewness 2.2). A sample of four values from such a distribution
+of the number of disks is skewed (skewness 2.2). A sample of four values from a skewed distribution
 often includes no large value; both the mean and the error of the sample are then too small. For
 means over more values, drawn at random from 240 craters, the coverage is better: 64 % for 16
 values, and 67 % for 64 values. The exponents are calculated from the numbers of disks. Because of
