@@ -73,8 +73,8 @@ void ricochet_close(ricochet *);
    rule of the input applies, if it contains one. A limit on collisions or events is reached exactly: the simulation may
    stop between simultaneous events, and the next call executes the remaining events. In a time-stepped simulation the limit
    may be exceeded, because a step is always completed. The results do not depend on the number of calls.
-   Returns 0 when a limit is reached, 1 if `patience` seconds have passed before (call the function again), or an exit code:
-   2 if `time` is NAN, other codes if the simulation cannot be continued. */
+   Returns 0 when a limit is reached, and 1 if `patience` seconds have passed before; in this case call the function again.
+   Otherwise the function returns an exit code: 2 if `time` is NAN, and other codes if the simulation cannot be continued. */
 int ricochet_advance(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
 
 /* Advances a simulation like ricochet_advance, but by at most one event. In a time-stepped simulation, all events of the

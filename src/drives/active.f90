@@ -27,8 +27,8 @@ module active
       not_negative, "1/time", goes_with="kind "//word, may_change=in_motion), &
     variable_t("drive", "turning_rate", "real", 1, "fallback", "0", &
       "Constant rate at which the orientation of active disks turns, in addition to its diffusion; positive counter-clockwise. " &
-      //"Free disks with this orientation move on circles of radius self_propulsion_speed/turning_rate. Choose an interval well " &
-      //"below 1/turning_rate.", unit="1/time", goes_with="kind "//word, may_change=in_motion)]
+      //"Free disks whose orientation turns at this rate move on circles of radius self_propulsion_speed/turning_rate. Choose an " &
+      //"interval well below 1/turning_rate.", unit="1/time", goes_with="kind "//word, may_change=in_motion)]
 
   type, extends(brownian_t) :: active_t
     real(real64) :: speed = 0.0_real64           !! self-propulsion speed [length/time]

@@ -25,8 +25,8 @@ module drives
 
   type(variable_t), parameter :: drive_rows(*) = [ &
     variable_t("drive", "kind", "text", 1, "default", "'none'", &
-      "Kind of driving. At all multiples of the time interval, driving changes the velocities of the disks; each such change " &
-      //"is called a kick. Kicks of the kind 'recycle' also move disks. Not available with stop.energy_fraction or " &
+      "Kind of driving. At all multiples of the time interval, driving changes the velocities of the disks; each such change is " &
+      //"called a kick. Kicks of the kind 'recycle' also move disks. Driving is not available with stop.energy_fraction or " &
       //"stop.at_rest.", &
       choices="none "//kinds, may_change=in_motion), &
     variable_t("drive", "interval", "real", 1, "required", "0.01", &
@@ -43,7 +43,7 @@ module drives
       otherwise="none; must be given where it applies, or velocity instead if kind is 'recycle'"), &
     recycle_rows, active_rows, &
     variable_t("drive", "species", "text", 1, "fallback", "''", &
-      "Species that is driven; all species if the text is empty.", &
+      "Name of the species that is driven. If the text is empty, all species are driven.", &
       goes_with="kind "//kinds, may_change=in_motion)]
 
 contains

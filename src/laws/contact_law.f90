@@ -21,7 +21,7 @@ module contact_law
       //"collided less than t_c ago. With t_c = 0 the model is switched off. Choose t_c far below the mean time between " &
       //"collisions and, for grains of diameter d resting under gravity g, below sqrt(d/g). The model does not prevent the " &
       //"collapse of resting grains with friction or with a tangential restitution between -1 and 1, because such grains " &
-      //"dissipate energy even in these elastic collisions. Not available with stop.at_rest.", &
+      //"dissipate energy even in these elastic collisions. The TC model is not available with stop.at_rest.", &
       not_negative, "time", may_change=in_motion)
 
   type(variable_t), parameter :: inertia_row = &
@@ -32,8 +32,9 @@ module contact_law
 
   type(variable_t), parameter :: pair_restitution_row = &
     variable_t("contact", "pair_restitution", "real", 0, "optional", "1, 0.9, 0.9, 0.8", &
-      "Coefficients of restitution of each pair of species, given instead of contact.restitution: a symmetric n x n matrix " &
-      //"for n species, listed as 1-1, 1-2, ..., 2-1, 2-2, ... in the order of the species in the input file.", unit_interval, &
+      "Coefficients of restitution of each pair of species, given instead of contact.restitution. The values form a symmetric n " &
+      //"x n matrix for n species, listed as 1-1, 1-2, ..., 2-1, 2-2, ... in the order of the species in the input file.", &
+      unit_interval, &
       may_change=in_motion, otherwise="contact.restitution for all pairs")
 
   !> All variables of the group `&contact`.

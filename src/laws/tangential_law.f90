@@ -16,8 +16,8 @@ module tangential_law
       //"collide millions of times; use -1 or 1 for these grains.", &
       tangential, may_change=in_motion), &
     variable_t("contact", "friction", "real", 1, "optional", "0.3", &
-      "Coulomb friction coefficient of disk-disk collisions: upper limit of the ratio of tangential to normal impulse. Needs " &
-      //"rough disks (tangential_restitution > -1). Friction dissipates energy even in collisions that the TC model " &
+      "Coulomb friction coefficient of disk-disk collisions: upper limit of the ratio of tangential to normal impulse. Friction " &
+      //"needs rough disks (tangential_restitution > -1). Friction dissipates energy even in collisions that the TC model " &
       //"(contact_time) makes elastic. With friction, grains resting in a dense bed collapse or collide millions of times; use " &
       //"tangential_restitution = 1 without friction for these grains.", &
       not_negative, may_change=in_motion, &
@@ -31,8 +31,8 @@ module tangential_law
       //"they reverse it.", tangential, goes_with="wall_rule normal", &
       may_change=in_motion, otherwise="contact.tangential_restitution"), &
     variable_t("contact", "wall_friction", "real", 1, "optional", "0.3", &
-      "Coulomb friction coefficient of collisions with sides and obstacles, except those with a value of their own (friction " &
-      //"in &side, &obstacle or &wall). Needs rough boundaries (wall_tangential_restitution > -1).", &
+      "Coulomb friction coefficient of collisions with sides and obstacles, except those with a value of their own (friction in " &
+      //"&side, &obstacle or &wall). Friction needs rough boundaries (wall_tangential_restitution > -1).", &
       not_negative, goes_with="wall_rule normal", &
       may_change=in_motion, otherwise="contact.friction")]
 
@@ -43,8 +43,8 @@ module tangential_law
       //"they reverse it. Above -1 the boundary is rough, and the disks rotate.", tangential, goes_with="rule normal", &
       may_change=in_motion, otherwise="contact.wall_tangential_restitution"), &
     variable_t("", "friction", "real", 1, "optional", "0.3", &
-      "Coulomb friction coefficient of this boundary: upper limit of the ratio of tangential to normal impulse. Needs a rough " &
-      //"boundary (tangential_restitution > -1).", not_negative, goes_with="rule normal", &
+      "Coulomb friction coefficient of this boundary: upper limit of the ratio of tangential to normal impulse. Friction needs a " &
+      //"rough boundary (tangential_restitution > -1).", not_negative, goes_with="rule normal", &
       may_change=in_motion, otherwise="contact.wall_friction")]
 
   !> Tangential interaction of two rough surfaces (Walton 1993, and Luding, Huthmann, McNamara and

@@ -44,10 +44,10 @@ module wall_law
     variable_t("", "restitution", "real", 1, "optional", "0.9", &
       "Coefficient of restitution of disks colliding with this boundary: 1 is elastic, 0 perfectly inelastic. The collision rule " &
       //"(rule) determines whether the coefficient applies to both components of the velocity or only to the normal component. " &
-      //"Not available for a thermal boundary (temperature).", unit_interval, &
+      //"This variable is not available for a thermal boundary (temperature).", unit_interval, &
       may_change=in_motion, otherwise="contact.wall_restitution"), &
     variable_t("", "rule", "text", 1, "optional", "'normal'", &
-      "Collision rule of this boundary. Not available for a thermal boundary (temperature).", choices=wall_rules, &
+      "Collision rule of this boundary. This variable is not available for a thermal boundary (temperature).", choices=wall_rules, &
       may_change=in_motion, otherwise="contact.wall_rule"), &
     own_tangential_rows, &
     variable_t("", "temperature", "real", 1, "optional", "1", &

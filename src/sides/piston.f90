@@ -12,7 +12,7 @@ module piston
   character(len=*), parameter :: word = "piston"
   type(choice_t), parameter :: choices(*) = [ &
     choice_t("motion", word, "The side is a piston of finite mass, accelerated by collisions and by a constant force, which " &
-      //"corresponds to a constant pressure. Not available with run.dynamics = 'steps'.")]
+      //"corresponds to a constant pressure. This motion is not available with run.dynamics = 'steps'.")]
   type(variable_t), parameter :: rows(*) = [ &
     variable_t("side", "mass", "real", 1, "required", "10", &
       "Mass of the piston. Gravity does not act on the piston.", &

@@ -16,11 +16,11 @@ module boundary_variables
       "Kind of boundary along x (left and right side), then along y (bottom and top side).", &
       choices="wall periodic"), &
     variable_t("box", "gravity", "real", 2, "default", "0, 0", &
-      "Uniform acceleration (x, y) of all disks. The component along a periodic axis must be 0. Not available with " &
+      "Uniform acceleration (x, y) of all disks. The component along a periodic axis must be 0. Gravity is not available with " &
       //"box.shear_rate or output.helfand.", unit="length/time**2", may_change=in_motion), &
     variable_t("box", "shear_rate", "real", 1, "default", "0", &
-      "Shear rate: gradient along y of the flow velocity along x, imposed by Lees-Edwards boundary conditions. Needs " &
-      //"box.boundary = 'periodic', 'periodic'. Not available with box.gravity, &obstacle, &wall, run.dynamics = 'steps', " &
+      "Shear rate: gradient along y of the flow velocity along x, imposed by Lees-Edwards boundary conditions. Shear needs " &
+      //"box.boundary = 'periodic', 'periodic', and is not available with box.gravity, &obstacle, &wall, run.dynamics = 'steps', " &
       //"output.helfand, stop.energy_fraction or stop.at_rest.", unit="1/time")]
 
   type(variable_t), parameter :: side_rows(*) = [ &
@@ -38,8 +38,8 @@ module boundary_variables
 
   type(variable_t), parameter :: obstacle_rows(*) = [ &
     variable_t("obstacle", "name", "text", 1, "optional", "'scatterer'", &
-      "Name of the obstacle in messages, in the output file and in --set obstacle.NAME.VARIABLE=VALUE: up to 40 letters, " &
-      //"digits, _ and -, beginning with a letter. The names of all obstacles and walls must differ.", &
+      "Name of the obstacle in messages, in the output file and in --set obstacle.NAME.VARIABLE=VALUE. A name has up to 40 " &
+      //"letters, digits, _ and -, and begins with a letter. The names of all obstacles and walls must differ.", &
       otherwise="obstacle1, obstacle2, ... in the order of the file"), &
     variable_t("obstacle", "centre", "real", 2, "example", "0.5, 0.5", &
       "Centre (x, y) of the circle.", unit="length", &
@@ -47,8 +47,8 @@ module boundary_variables
     variable_t("obstacle", "radius", "real", 1, "example", "0.2", &
       "Radius of the circle.", positive, "length", otherwise="none; needed, unless file is given"), &
     variable_t("obstacle", "side", "text", 1, "default", "'outside'", &
-      "Side of the circle on which the disks are. Not available for arcs (from_angle, to_angle), because disks bounce off " &
-      //"both faces of an arc.", choices="outside inside"), &
+      "Side of the circle on which the disks are. This variable is not available for arcs (from_angle, to_angle), because disks " &
+      //"bounce off both faces of an arc.", choices="outside inside"), &
     variable_t("obstacle", "from_angle", "real", 1, "optional", "0", &
       "Angle at which an arc begins, measured counter-clockwise from the +x direction. With from_angle and to_angle, given " &
       //"together, the obstacle is an arc instead of a whole circle. Disks bounce off both faces and both ends of the arc.", &
@@ -59,17 +59,17 @@ module boundary_variables
       //"to to_angle. Disks pass through the gap between the ends of the arc if the gap is wide enough.", last_angle, "degrees", &
       excludes="side", otherwise="none; the obstacle is a whole circle"), &
     variable_t("obstacle", "file", "text", 1, "optional", "'scatterers.txt'", &
-      "File with many circles, given instead of centre and radius: a text file with a line of column names (x y radius) and " &
-      //"one line per circle, or an HDF5 file (.h5) with the datasets centre and radius. Up to 1000000 circles form a single " &
-      //"obstacle, with one collision rule and one set of observables. With from_angle and to_angle, each circle is replaced " &
-      //"by an arc between these two angles. The path is relative to the folder in which the program is started.", &
+      "File with many circles, given instead of centre and radius. The file is a text file with a line of column names (x y " &
+      //"radius) and one line per circle, or an HDF5 file (.h5) with the datasets centre and radius. Up to 1000000 circles form " &
+      //"a single obstacle, with one collision rule and one set of observables. With from_angle and to_angle, each circle is " &
+      //"replaced by an arc between these two angles. The path is relative to the folder in which the program is started.", &
       excludes="centre radius", &
       otherwise="none; the group describes one circle")]
 
   type(variable_t), parameter :: wall_rows(*) = [ &
     variable_t("wall", "name", "text", 1, "optional", "'ramp'", &
-      "Name of the wall in messages, in the output file and in --set wall.NAME.VARIABLE=VALUE: up to 40 letters, digits, _ " &
-      //"and -, beginning with a letter. The names of all obstacles and walls must differ.", &
+      "Name of the wall in messages, in the output file and in --set wall.NAME.VARIABLE=VALUE. A name has up to 40 letters, " &
+      //"digits, _ and -, and begins with a letter. The names of all obstacles and walls must differ.", &
       otherwise="wall1, wall2, ... in the order of the file"), &
     variable_t("wall", "from", "real", 2, "example", "0.2, 0.3", &
       "First end point (x, y) of the straight wall, inside the box. Disks bounce off both faces and both ends of the wall.", &
@@ -83,10 +83,10 @@ module boundary_variables
       unit="length", excludes="from to", otherwise="none; the wall is one straight " &
       //"segment"), &
     variable_t("wall", "file", "text", 1, "optional", "'walls.txt'", &
-      "File with many straight walls, given instead of from and to: a text file with a line of column names (x1 y1 x2 y2) and " &
-      //"one line per wall, or an HDF5 file (.h5) with the datasets from and to. Up to 1000000 walls form a single obstacle, " &
-      //"with one collision rule and one set of observables. The path is relative to the folder in which the program is " &
-      //"started.", excludes="from to points", &
+      "File with many straight walls, given instead of from and to. The file is a text file with a line of column names (x1 y1 " &
+      //"x2 y2) and one line per wall, or an HDF5 file (.h5) with the datasets from and to. Up to 1000000 walls form a single " &
+      //"obstacle, with one collision rule and one set of observables. The path is relative to the folder in which the program " &
+      //"is started.", excludes="from to points", &
       otherwise="none; the group describes one wall or polyline")]
 
   type(variable_t), parameter :: boundary_rows(*) = [box_rows, side_rows, obstacle_rows, wall_rows, wall_law_rows]

@@ -16,8 +16,8 @@ module choices
   type(choice_t), parameter :: list(*) = [ &
     choice_t("dynamics", "events", "Event-driven: exact motion from one collision to the next, without a time step."), &
     choice_t("dynamics", "steps", "Time-stepped, for comparison: all disks move for a time step dt, and then overlapping pairs " &
-      //"collide. Collisions take place up to one step too late, and short contacts can be missed. Not available with " &
-      //"box.shear_rate or a piston."), &
+      //"collide. Collisions take place up to one step too late, and short contacts can be missed. This choice is not available " &
+      //"with box.shear_rate or a piston."), &
     choice_t("search", "cells", "Search in the 3 x 3 cells around a disk, or in neighbour lists if disks of very different " &
       //"sizes crowd the cells. The cost per event does not depend on the number N of disks."), &
     choice_t("search", "pairs", "Search among all disks, at a cost of O(N) per event."), &

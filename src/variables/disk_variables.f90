@@ -10,7 +10,7 @@ module disk_variables
   type(variable_t), parameter :: species_rows(*) = [ &
     variable_t("species", "name", "text", 1, "optional", "'gas'", &
       "Name of the species in messages, in the output file, in relative_to and drive.species, and in --set " &
-      //"species.NAME.VARIABLE=VALUE: up to 40 letters, digits, _ and -, beginning with a letter.", &
+      //"species.NAME.VARIABLE=VALUE. A name has up to 40 letters, digits, _ and -, and begins with a letter.", &
       otherwise="species1, species2, ... in the order of the file"), &
     variable_t("species", "count", "integer", 1, "example", "100", &
       "Number of disks of the species.", count_of_disks, &
@@ -36,15 +36,15 @@ module disk_variables
       fraction, excludes="radius relative_to", otherwise="none; the radius is given in another " &
       //"way"), &
     variable_t("species", "radius_distribution", "text", 1, "optional", "'gaussian'", &
-      "Distribution of the radii of a polydisperse species about their mean, truncated so that the largest radius is at most " &
-      //"ten times the smallest. Needs polydispersity.", &
+      "Distribution of the radii of a polydisperse species about their mean, truncated so that the largest radius is at most ten " &
+      //"times the smallest. The distribution needs polydispersity.", &
       choices="uniform gaussian " &
       //"lognormal", &
       otherwise="'uniform' if polydispersity is given; else all radii are equal"), &
     variable_t("species", "polydispersity", "real", 1, "required", "0.2", &
       "Polydispersity: standard deviation of the radii divided by their mean. The largest value is 0.47 for the uniform, 0.27 " &
-      //"for the Gaussian and 0.39 for the lognormal distribution. Not available for radii read from an initial-configuration " &
-      //"file (file).", &
+      //"for the Gaussian and 0.39 for the lognormal distribution. Polydispersity is not available for radii read from an " &
+      //"initial-configuration file (file).", &
       spread_of_radii, goes_with="radius_distribution uniform gaussian lognormal"), &
     variable_t("species", "mass_scaling", "text", 1, "fallback", "'equal'", &
       "Dependence of the mass of a disk on its radius, in a polydisperse species.", choices="equal area", &
@@ -65,16 +65,16 @@ module disk_variables
       //"momentum.", &
       choices="rest equal_speed uniform maxwell explicit file"), &
     variable_t("species", "speed", "real", 1, "fallback", "1", &
-      "Initial speed of the disks. With velocities = 'uniform', upper limit of |vx| and |vy|.", &
+      "Initial speed of the disks. With velocities = 'uniform', the value is the upper limit of |vx| and |vy|.", &
       not_negative, "length/time", goes_with="velocities equal_speed uniform"), &
     variable_t("species", "temperature", "real", 1, "fallback", "1", &
       "Temperature kT of the Maxwell distribution from which the initial velocities are drawn. The kinetic temperature of the " &
       //"drawn velocities fluctuates about this value, unless exact_temperature is given.", not_negative, "energy", &
       goes_with="velocities maxwell"), &
     variable_t("species", "exact_temperature", "real", 1, "optional", "1", &
-      "Exact initial temperature kT of the species: velocities v relative to its centre of mass are scaled so that the sum of m " &
-      //"v**2 over its N disks is 2N kT. The scaling applies to all methods (velocities) except 'rest', and needs at least two " &
-      //"disks.", &
+      "Exact initial temperature kT of the species. The velocities v relative to the centre of mass of the species are scaled so " &
+      //"that the sum of m v**2 over its N disks is 2N kT. The scaling applies to all methods (velocities) except 'rest', and " &
+      //"needs at least two disks.", &
       not_negative, "energy", &
       otherwise="none; velocities are not scaled"), &
     variable_t("species", "velocity", "real", 0, "required", "1, 0", &

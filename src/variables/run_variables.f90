@@ -38,8 +38,8 @@ module run_variables
 
   type(variable_t), parameter :: change_rows(*) = [ &
     variable_t("change", "name", "text", 1, "optional", "'quench'", &
-      "Name of the change in messages and in --set change.NAME.VARIABLE=VALUE: up to 40 letters, digits, _ and -. The names " &
-      //"of all changes must differ.", may_change=on_resume, otherwise="1, 2, ... in the order of the file"), &
+      "Name of the change in messages and in --set change.NAME.VARIABLE=VALUE. A name has up to 40 letters, digits, _ and -. The " &
+      //"names of all changes must differ.", may_change=on_resume, otherwise="1, 2, ... in the order of the file"), &
     variable_t("change", "time", "real", 1, "example", "1", &
       "Time of the change. The change takes place after the collisions and before the kicks and samples of the same time. With " &
       //"run.dynamics = 'steps', the change takes place at the end of the step that contains this time. Times after the end of " &
@@ -60,7 +60,8 @@ module run_variables
       "Number of disk-disk collisions after which the run ends.", not_negative, may_change=on_resume, &
       otherwise="no limit"), &
     variable_t("stop", "collisions_per_disk", "real", 1, "optional", "20", &
-      "Number of collisions per disk, 2C/N for C collisions between N disks, after which the run ends.", &
+      "Number of collisions per disk after which the run ends. With N disks and C collisions, the number of collisions per disk " &
+      //"is 2C/N.", &
       not_negative, may_change=on_resume, &
       otherwise="no limit"), &
     variable_t("stop", "events", "integer", 1, "optional", "100000", &
@@ -72,14 +73,14 @@ module run_variables
       //"and at most this number of disks remains.", not_negative, may_change=on_resume, otherwise="no limit"), &
     variable_t("stop", "energy_fraction", "real", 1, "optional", "0.1", &
       "Fraction of the initial kinetic energy at which the run ends. The remaining energy is the initial kinetic energy minus " &
-      //"all energy dissipated in collisions. This rule needs inelastic collisions or a second stop rule. Not available with " &
-      //"driving, with shear, or with thermal, sliding or moving boundaries.", &
+      //"all energy dissipated in collisions. This rule needs inelastic collisions or a second stop rule. The rule is not " &
+      //"available with driving, with shear, or with thermal, sliding or moving boundaries.", &
       energy_left, may_change=on_resume, otherwise="no limit"), &
     variable_t("stop", "at_rest", "logical", 1, "optional", ".true.", &
       "End of the run when all disks have come to rest. With box.gravity, a disk comes to rest when its sequence of ever shorter " &
       //"bounces has converged; without gravity, a disk is at rest when it no longer moves. This rule needs inelastic " &
-      //"collisions. Not available with run.dynamics = 'steps', contact.contact_time, driving, shear, or thermal, sliding or " &
-      //"moving boundaries.", &
+      //"collisions. The rule is not available with run.dynamics = 'steps', contact.contact_time, driving, shear, or thermal, " &
+      //"sliding or moving boundaries.", &
       may_change=on_resume, &
       otherwise=".false.: disks at rest do not end the run"), &
     variable_t("stop", "wall_clock", "real", 1, "optional", "3600", &
@@ -98,7 +99,8 @@ module run_variables
       "Number of events (collisions of disks with disks, sides and obstacles) between frames.", positive, &
       may_change=on_resume, otherwise="frames of the initial and the final state only"), &
     variable_t("output", "frames_every_collisions_per_disk", "real", 1, "optional", "1", &
-      "Number of collisions per disk, 2C/N for C collisions between N disks, between frames.", positive, may_change=on_resume, &
+      "Number of collisions per disk between frames. With N disks and C collisions, the number of collisions per disk is 2C/N.", &
+      positive, may_change=on_resume, &
       otherwise="frames of the initial and the final state only"), &
     variable_t("output", "frames_at", "real", 0, "optional", "0.1, 1, 10", &
       "Times of additional frames, in increasing order. Times after the end of the run are allowed, because a run resumed " &
@@ -122,7 +124,8 @@ module run_variables
       "Number of events (collisions of disks with disks, sides and obstacles) between samples of the observables.", &
       positive, may_change=on_resume, otherwise="samples of the initial and the final state only"), &
     variable_t("output", "observables_every_collisions_per_disk", "real", 1, "optional", "0.1", &
-      "Number of collisions per disk, 2C/N for C collisions between N disks, between samples of the observables.", &
+      "Number of collisions per disk between samples of the observables. With N disks and C collisions, the number of collisions " &
+      //"per disk is 2C/N.", &
       positive, may_change=on_resume, &
       otherwise="samples of the initial and the final state only"), &
     variable_t("output", "observables_at", "real", 0, "optional", "0.1, 1, 10", &
@@ -149,7 +152,7 @@ module run_variables
       //"boundaries, and with helfand = .true. In other systems this output slows the run down slightly."), &
     variable_t("output", "helfand", "logical", 1, "default", ".false.", &
       "Accumulation of the Helfand moments of momentum and energy, from which transport.py calculates shear viscosity, bulk " &
-      //"viscosity and thermal conductivity. Not available with box.gravity or box.shear_rate."), &
+      //"viscosity and thermal conductivity. Helfand moments are not available with box.gravity or box.shear_rate."), &
     variable_t("output", "checkpoint_every", "real", 1, "optional", "600", &
       "Wall-clock time between checkpoints. A killed run can be resumed from its last checkpoint.", positive, "s", &
       may_change=on_resume, otherwise="a checkpoint only when the run stops or ends")]

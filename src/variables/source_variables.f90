@@ -7,8 +7,8 @@ module source_variables
 
   type(variable_t), parameter :: source_rows(*) = [ &
     variable_t("source", "name", "text", 1, "optional", "'pump'", &
-      "Name of the source in messages, in the output file and in --set source.NAME.VARIABLE=VALUE: up to 40 letters, digits, " &
-      //"_ and -, beginning with a letter.", otherwise="source1, source2, ... in the order of the file"), &
+      "Name of the source in messages, in the output file and in --set source.NAME.VARIABLE=VALUE. A name has up to 40 letters, " &
+      //"digits, _ and -, and begins with a letter.", otherwise="source1, source2, ... in the order of the file"), &
     variable_t("source", "species", "text", 1, "optional", "'gas'", &
       "Species whose waiting disks enter the box. Disks wait from the start (species.waiting) or after leaving the box " &
       //"through an open side (side.open).", otherwise="the only species; needed with several species"), &
@@ -18,8 +18,8 @@ module source_variables
       //"walls. If none of 100 random positions is free for a disk, the source tries the next disk.", &
       unit="length", otherwise="the whole box"), &
     variable_t("source", "interval", "real", 1, "example", "0.1", &
-      "Time between two actions of the source. At all multiples of the interval from start_time to end_time, the waiting " &
-      //"disks with the lowest ids enter. Several sources act in the order of the file. Not available with drive.kind = " &
+      "Time between two actions of the source. At all multiples of the interval from start_time to end_time, the waiting disks " &
+      //"with the lowest ids enter. Several sources act in the order of the file. Sources are not available with drive.kind = " &
       //"'recycle'.", positive, "time", may_change=in_motion), &
     variable_t("source", "count", "integer", 1, "default", "1", &
       "Largest number of disks that enter at one time. With count = 0 no disk enters.", not_negative, may_change=in_motion), &
