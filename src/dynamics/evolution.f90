@@ -1,6 +1,6 @@
 !> Abstract type of all dynamics (event-driven, time-stepped, parallel), as used by the timeline.
 module evolution
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int32, int64, never, real64, unlimited
   use errors, only: error_t
   use event_log, only: event_log_t
   use simulation_state, only: simulation_t
@@ -15,15 +15,15 @@ module evolution
     !> Limit of the simulation time, measured from the start of the run or, in the procedures of
     !> `evolution_t`, from the time origin `box%epoch` [time].
     real(real64) :: time = never
-    integer(int64) :: collisions = huge(0_int64)
-    integer(int64) :: events = huge(0_int64)
+    integer(int64) :: collisions = unlimited
+    integer(int64) :: events = unlimited
     real(real64) :: dissipated = huge(0.0_real64)        !! dissipated energy [energy]
     logical :: at_rest = .false.      !! whether the dynamics returns when all disks are at rest
     !> Number of disks in the box at which the dynamics returns after a departure; -1 for no limit.
     integer(int64) :: disks_inside = -1
     !> Number of iterations of the event loop after which the dynamics returns, so that the caller
     !> can check signals and the wall clock.
-    integer(int64) :: iterations = huge(0_int64)
+    integer(int64) :: iterations = unlimited
     !> Time of the latest sample; the run does not end earlier [time].
     real(real64) :: sampled = 0.0_real64
   contains

@@ -7,7 +7,7 @@
 !> the time when the velocities were last set. The latter energy determines the magnitude of the
 !> rounding errors.
 module stop_rules
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int32, int64, never, real64, unlimited
   use entries, only: awaits_entry
   use evolution, only: evolution_t, limits_t
   use rest, only: has_come_to_rest, is_at_rest, stands_still
@@ -25,9 +25,9 @@ module stop_rules
   !> The values of the stop rules in the input. The default values are never reached.
   type :: stop_settings_t
     real(real64) :: time = never
-    integer(int64) :: collisions = huge(0_int64)
+    integer(int64) :: collisions = unlimited
     real(real64) :: collisions_per_disk = never
-    integer(int64) :: events = huge(0_int64)
+    integer(int64) :: events = unlimited
     real(real64) :: energy_fraction = 0.0_real64
     logical :: at_rest = .false.                      !! whether the run ends when all disks are at rest
     !> Number of disks in the box at which a departure ends the run; -1: no limit.

@@ -7,7 +7,7 @@
 !> replaced by a larger one in an atomic renaming. At the end of the run the file is replaced by a
 !> copy without unused space.
 module output
-  use kinds, only: int64, never, real64
+  use kinds, only: int64, never, real64, unlimited
   use sampling_schedule, only: frames, progress_t, values
   use checkpoint, only: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, &
     mark_as_broken, put_checkpoint, put_last_checkpoint
@@ -257,7 +257,7 @@ contains
       end if
       self%is_copied = any(self%track%planned == 0)
       ! Collisions with boundaries are also logged, but do not count as disk–disk collisions.
-      if (settings%event_log) self%is_copied = self%is_copied .or. (rule%limits%collisions < huge(0_int64) &
+      if (settings%event_log) self%is_copied = self%is_copied .or. (rule%limits%collisions < unlimited &
         .and. (sim%box%has_obstacles() .or. .not. all(sim%box%periodic)))
     end associate
   end subroutine plan
