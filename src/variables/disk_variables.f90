@@ -73,8 +73,8 @@ module disk_variables
       goes_with="velocities maxwell"), &
     variable_t("species", "exact_temperature", "real", 1, "optional", "1", &
       "Exact initial temperature kT of the species. The velocities v relative to the centre of mass of the species are scaled so " &
-      //"that the sum of m v**2 over its N disks is 2N kT. The scaling applies to all methods (velocities) except 'rest', and " &
-      //"needs at least two disks.", &
+      //"that the sum of m v**2 over its N disks is 2N kT. The scaling applies to all values of velocities except 'rest', " &
+      //"and needs at least two disks.", &
       not_negative, "energy", &
       otherwise="none; velocities are not scaled"), &
     variable_t("species", "velocity", "real", 0, "required", "1, 0", &

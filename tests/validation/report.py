@@ -288,8 +288,7 @@ reasons:
 - The rows of the Lyapunov exponent and of gases under gravity were repeated after the bias of the
   exponent and the equilibration had been changed.
 
-Curves of cooling gases as functions of time are compared at one fixed time. An error bar belongs to
-a single run, or to a group of runs if the name of the system states a number of runs. The table has
+Curves of cooling gases as functions of time are compared at one fixed time. An error bar refers to a single run, or to a group of runs if the name of the system contains a number of runs. The table has
 the following columns:
 
 - *bars*: number of runs or groups of runs.
