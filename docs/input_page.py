@@ -203,7 +203,7 @@ def example_of(group: str) -> list[str]:
     kind = "side" if group == LAW else group
     blocks = re.findall(rf"^&{kind}\n.*?^/\n", text, re.MULTILINE | re.DOTALL)
     link = f"[{name}.nml](../../../input/{name}.nml)"
-    lines = ["## Example", "", f"The example is part of {link}:", "", "```text"]
+    lines = ["## Example", "", f"The following example is part of {link}:", "", "```text"]
     lines += ["".join(blocks).rstrip("\n"), "```"]
     if (ROOT / f"input/pictures/{name}.png").exists():
         lines += ["", f"![{name}.nml](../../../input/pictures/{name}.png)"]
@@ -239,7 +239,7 @@ def pages(program: Path) -> dict[str, str]:
         for group, entries in groups.items()
     }
     items = "".join(
-        f"- [{title_of(group)}](input/{file_of(group)}.md): "
+        f"- [{title_of(group)}](input/{file_of(group)}.md) with the variables "
         + ", ".join(f"`{name}`" for name in entries)
         + "\n"
         for group, entries in groups.items()

@@ -33,7 +33,7 @@ INPUTS_HEAD = """\
 # Inputs
 
 All files in `input/` are listed here. An input file is ready to run, and comments in the file
-explain the settings. The pictures show the simulations at one time; `make lab` shows the
+explain the settings. The pictures show the simulations at one time, and `make lab` shows the
 simulations in motion. `docs/reference_pages.py` generates this page.
 
 """

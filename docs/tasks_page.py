@@ -29,13 +29,13 @@ Over eight seeds, the light disks end with ⟨K⟩ = {K_light} and the heavy dis
 (heavy disks; theory {v_heavy_theory}).
 """,
     "cooling": """\
-After 20 collisions per disk the heavy disks are hotter than the light ones by the factor {ratio_1}
-for ξ = 1, {ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds). For ξ < 1 the two
-species have different temperatures: the gas violates equipartition.
+After 20 collisions per disk the temperature ratio of heavy and light disks is {ratio_1} for ξ = 1,
+{ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds). For ξ < 1 the heavy disks are
+hotter than the light ones: the gas violates equipartition.
 """,
     "walls": """\
-After 20 collisions per disk K/K₀ is {left_velocity} with the walls of the exam and {left_normal}
-with smooth walls (ξ = 0.8, eight seeds).
+After 20 collisions per disk the ratio K/K₀ is {left_velocity} with the walls of the exam, and
+{left_normal} with smooth walls (ξ = 0.8, eight seeds).
 """,
     "crater": """\
 - *Size.* In a bed of 2000 grains {hit} are hit, and {displaced} move by more than their radius.
@@ -71,8 +71,8 @@ compares the measured and the calculated fraction of missed collisions (32 pairs
 | 0.004 | {missed_0.004} | {expected_0.004} |
 """,
     "equipartition": """\
-The time T after which the mean energies of both species agree within 10 % hardly depends on v₀:
-among the four values of v₀, the shortest T is ({T_first}) s, and the longest T is ({T_last}) s.
+The mean energies of both species agree within 10 % after a time T, which hardly depends on v₀. Among
+the four values of v₀, the shortest T is ({T_first}) s, and the longest T is ({T_last}) s.
 """,
     "laws": """\
 The table lists the slopes measured with seed 1, divided by the slopes of the exponential laws. The

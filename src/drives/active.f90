@@ -15,8 +15,8 @@ module active
 
   character(len=*), parameter :: word = "active"
   type(choice_t), parameter :: choices(*) = [ &
-    choice_t("kind", word, "Active Brownian disks: as 'brownian', but each kick also adds a velocity (self_propulsion_speed) " &
-      //"along the orientation of the disk. The orientation diffuses.")]
+    choice_t("kind", word, "Active Brownian disks: kicks assign new velocities as with 'brownian', and also add a velocity " &
+      //"(self_propulsion_speed) along the orientation of the disk. The orientation diffuses.")]
   type(variable_t), parameter :: rows(*) = [ &
     variable_t("drive", "self_propulsion_speed", "real", 1, "required", "1", &
       "Self-propulsion speed of active disks: each kick adds a velocity of this magnitude along the orientation of the disk.", &

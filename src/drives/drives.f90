@@ -20,7 +20,7 @@ module drives
   character(len=*), parameter :: counting_drives = recycle_word, drive_counters = recycle_count_word
 
   type(choice_t), parameter :: drive_choices(*) = [ &
-    choice_t("kind", "none", "No driving."), &
+    choice_t("kind", "none", "The disks are not driven."), &
     noise_choices, andersen_choices, brownian_choices, active_choices, recycle_choices, recycle_count]
 
   type(variable_t), parameter :: drive_rows(*) = [ &

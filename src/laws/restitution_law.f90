@@ -18,9 +18,9 @@ module restitution_law
     choice_t("restitution_law", "constant", "Coefficients of restitution do not depend on the impact speed."), &
     choice_t("restitution_law", "power", "Below reference_speed, 1 - e is proportional to g**(1/5), where e is the " &
       //"coefficient of restitution and g is the impact speed."), &
-    choice_t("restitution_law", "viscoelastic", "Viscoelastic bodies: below reference_speed, the coefficient of restitution " &
-      //"is e = 1 - y + 3/5 y**2, where y is proportional to g**(1/5) and g is the impact speed. The coefficients " &
-      //"of restitution in the input must be at least 7/12."), &
+    choice_t("restitution_law", "viscoelastic", "Disks are viscoelastic bodies: below reference_speed, the coefficient of " &
+      //"restitution is e = 1 - y + 3/5 y**2, where y is proportional to g**(1/5) and g is the impact speed. The coefficients of " &
+      //"restitution in the input must be at least 7/12."), &
     choice_t("restitution_law", "elastic_below", "Collisions at impact speeds below reference_speed are elastic. With this law " &
       //"smooth disks never undergo inelastic collapse, and never come to rest.")]
 

@@ -12,7 +12,7 @@ module explicit_placement
 
   character(len=*), parameter :: word = "explicit"
   type(choice_t), parameter :: choices(*) = [ &
-    choice_t("placement", word, "Positions listed in position.")]
+    choice_t("placement", word, "The positions are listed in the variable position.")]
   type(variable_t), parameter :: rows(*) = [ &
     variable_t("species", "position", "real", 0, "required", "0.2, 0.5, 0.8, 0.5", &
       "Positions x1, y1, x2, y2, ... of the disks.", unit="length", goes_with="placement "//word)]

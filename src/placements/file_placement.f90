@@ -12,7 +12,7 @@ module file_placement
 
   character(len=*), parameter :: word = "file"
   type(choice_t), parameter :: choices(*) = [ &
-    choice_t("placement", word, "Positions in the initial-configuration file (file).")]
+    choice_t("placement", word, "The positions are read from the initial-configuration file (file).")]
 
   type, extends(placement_t) :: file_placement_t
   contains

@@ -14,7 +14,8 @@ module grid_placement
 
   character(len=*), parameter :: word = "grid"
   type(choice_t), parameter :: choices(*) = [ &
-    choice_t("placement", word, "Rectangular grid that fills the region, with the numbers of columns and rows in grid.")]
+    choice_t("placement", word, "The disks form a rectangular grid that fills the region, with the numbers of columns and rows " &
+      //"in grid.")]
   type(variable_t), parameter :: rows(*) = [ &
     variable_t("species", "grid", "integer", 2, "required", "10, 10", &
       "Numbers of columns and rows of the rectangular grid. The number of disks is the product of these two numbers.", &

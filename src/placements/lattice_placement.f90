@@ -16,7 +16,7 @@ module lattice_placement
 
   character(len=*), parameter :: word = "lattice"
   type(choice_t), parameter :: choices(*) = [ &
-    choice_t("placement", word, "Triangular lattice that fills the region, up to the closest packing 0.9069.")]
+    choice_t("placement", word, "The disks form a triangular lattice that fills the region, up to the closest packing 0.9069.")]
 
   type, extends(placement_t) :: lattice_placement_t
   contains
