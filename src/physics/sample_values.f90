@@ -27,10 +27,9 @@ module sample_values
     frame_column_t("position", 2, meaning="Positions of the disks."), &
     frame_column_t("velocity", 2, meaning="Velocities of the disks."), &
     frame_column_t("event_count", is_count=.true., meaning="Number of events of each disk since the start."), &
-    frame_column_t("present", 1, .true., "The value 1 for disks in the box and 0 for others, if disks can leave or enter.", &
+    frame_column_t("present", 1, .true., "Value 1 for disks in the box and 0 for others, if disks can leave or enter.", &
       "side.open, a source (&source) or species.waiting"), &
-    frame_column_t("image", 2, .true., "Number of box periods that each disk has crossed (image counters), if a boundary is " &
-      //"periodic.", &
+    frame_column_t("image", 2, .true., "Number of box periods that each disk has crossed, if a boundary is periodic.", &
       "a periodic axis (box.boundary)"), &
     frame_column_t("angular_velocity", meaning="Angular velocities, if disks rotate.", &
       needs="disks that rotate, for example by contact.tangential_restitution"), &
