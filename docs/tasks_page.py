@@ -76,7 +76,7 @@ the four values of v₀, the shortest T is ({T_first}) s, and the longest T is (
 """,
     "laws": """\
 The table lists the slopes measured with seed 1, divided by the slopes of the exponential laws. The
-dashed lines in the figure are the laws for 60 disks of finite size with a fixed energy. The
+dashed lines in the figure show the laws for 60 disks of finite size with a fixed energy. The
 slopes of these laws differ slightly from 1 (last column).
 
 | histogram | measured | law for 60 disks |

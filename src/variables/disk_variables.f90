@@ -37,7 +37,7 @@ module disk_variables
       //"way"), &
     variable_t("species", "radius_distribution", "text", 1, "optional", "'gaussian'", &
       "Distribution of the radii of a polydisperse species about their mean, truncated so that the largest radius is at most ten " &
-      //"times the smallest. The distribution needs polydispersity.", &
+      //"times the smallest. A distribution can be given only together with polydispersity.", &
       choices="uniform gaussian " &
       //"lognormal", &
       otherwise="'uniform' if polydispersity is given; else all radii are equal"), &
