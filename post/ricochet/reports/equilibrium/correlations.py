@@ -106,15 +106,15 @@ def distances(least: float, most: float) -> np.ndarray:
 def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Curve]]:
     """Return psi6 of each run, and structure functions of all disks and of pairs of species."""
     some = [evenly(run, own) for run, own in zip(runs, frames, strict=True)]
-    psi = {(r.path, k): bond_order(r, k) for r, own in zip(runs, some, strict=True) for k in own}
-    each = [[psi[run.path, k] for k in own] for run, own in zip(runs, some, strict=True)]
+    psi = {(id(r), k): bond_order(r, k) for r, own in zip(runs, some, strict=True) for k in own}
+    each = [[psi[id(run), k] for k in own] for run, own in zip(runs, some, strict=True)]
     members = {
         "psi6_local": [correlated_mean([np.abs(one).mean() for one in own]) for own in each],
         "psi6_global": [correlated_mean([abs(one.mean()) for one in own]) for own in each],
     }
 
     def g6(run: Run, own: list[int], edges: np.ndarray) -> np.ndarray:
-        return bond_correlation(run, own, [psi[run.path, k] for k in own], edges)
+        return bond_correlation(run, own, [psi[id(run), k] for k in own], edges)
 
     edges = bins(runs[0])
     curves = {"g6": averaged(g6, runs, some, edges["g6"])}
