@@ -88,7 +88,7 @@ def test_windows_between_changes_have_the_laws_then_in_force(simulated):
                 np.testing.assert_array_equal(own.value, expected, err_msg=name)
 
 
-def test_displacements_in_a_sheared_window_are_those_of_the_run(simulated):
+def test_counts_of_disks_begin_at_zero_also_in_a_sheared_box(simulated):
     """The periodic images above and below have moved since the start of the run."""
     sheared = """
     &box upper = 1, 1 boundary = 'periodic', 'periodic' shear_rate = 2 /
@@ -98,8 +98,17 @@ def test_displacements_in_a_sheared_window_are_those_of_the_run(simulated):
     whole = simulated(sheared)
     window = whole.window(1.3)
     assert abs(whole.image[-1][:, 1]).max() > 0
-    np.testing.assert_array_equal(window.unwrapped(slice(None)), whole.unwrapped(slice(6, None)))
-    np.testing.assert_array_equal(window.unwrapped(-1), whole.unwrapped(-1))
+    late, step = slice(6, None), 0.25
+    moved = np.diff(window.unwrapped(slice(None)), axis=0)
+    row = 2 * step * np.floor(whole.unwrapped(6)[:, 1])  # at first in the row of the box
+    expected = np.diff(whole.unwrapped(late), axis=0)
+    expected[..., 0] -= row
+    np.testing.assert_allclose(moved, expected, atol=1e-12)
+    np.testing.assert_array_equal(window.unwrapped(0), window.position[0])
+    np.testing.assert_array_equal(window.unwrapped(-1), window.unwrapped([-1])[0])
+    counts = window.event_count[:]
+    np.testing.assert_array_equal(counts, whole.event_count[late] - whole.event_count[6])
+    assert counts[-1].sum() > counts[0].sum() == window.events_per_disk[0] == 0
 
 
 def test_a_window_of_a_window_is_a_window_of_the_run(simulated):
@@ -110,12 +119,129 @@ def test_a_window_of_a_window_is_a_window_of_the_run(simulated):
     np.testing.assert_allclose(inner.observable("work").value, direct.observable("work").value)
     assert [change.name for change in inner.changes] == [change.name for change in direct.changes]
     assert inner.restitution == direct.restitution == 0.8
+    laws = [one.parameters["contact"] for one in (whole.window(1, 3), whole.window(2).window(0))]
+    assert laws[0]["wall_restitution"] == 0.8 and laws[1]["wall_restitution"] == 1
+
+
+#: A gas beside a side that moves.
+BESIDE = """
+&box upper = 2, 1 /
+&side name = 'right' {side} /
+&species name = 'gas' count = 20 radius = 0.01 {start} /
+{more}
+&stop time = {end} / &output frames_every_time = 0.1 observables_every_time = 0.1 /
+"""
+STROKE = "motion = 'constant_velocity' velocity = -0.4"
+#: Motions of the side and a later change, the motion after t = 0.5, and a change after it.
+MOTIONS = [
+    ("motion = 'sine' amplitude = 0.05 period = 0.3 phase = 0.1", "", "{same}", ""),
+    ("motion = 'parabolic' amplitude = 0.05 period = 0.3 phase = 0.9", "", "{same}", ""),
+    (f"{STROKE} position = 1.5 end_time = 0.7", "", f"{STROKE} {{at}} end_time = 0.2", ""),
+    (f"{STROKE} position = 1.5 end_time = 0.44", "", "{at}", ""),
+    (
+        f"{STROKE} position = 1.5 start_time = 0.6 end_time = 1",
+        "",
+        f"{STROKE} {{at}} start_time = 0.1 end_time = 0.5",
+        "",
+    ),
+    (
+        "",
+        "&change time = 0.43 set = 'side.right.motion=constant_velocity', "
+        "'side.right.velocity=-0.4', 'side.right.end_time=0.8' /",
+        f"{STROKE} {{at}} end_time = 0.3",
+        "",
+    ),
+    (
+        f"{STROKE} position = 1.5 end_time = 3",
+        "&change time = 0.83 set = 'side.right.motion=still' /",
+        f"{STROKE} {{at}} end_time = 2.5",
+        "&change time = 0.33 set = 'side.right.motion=still' /",
+    ),
+]
+
+
+@pytest.mark.parametrize(("side", "more", "side_then", "more_then"), MOTIONS)
+def test_sides_move_in_a_window_as_in_a_run_that_starts_with_it(
+    simulated, tmp_path, side, more, side_then, more_then
+):
+    start = "temperature = 1 region = 0, 1.4, 0, 1"
+    whole = simulated(BESIDE.format(side=side, start=start, more=more, end=1.4))
+    window, place = whole.window(0.5, 1.3), tmp_path / "start.txt"
+    write_start(place, whole.position[5], whole.velocity[5])
+    same = f"{side.partition('phase')[0]} phase = {window.sides[1].get('phase')}"
+    then = {"side": side_then.format(same=same, at=f"position = {window.upper[0]}"), "end": 0.8}
+    start = f"placement = 'file' file = '{place}'"
+    again = simulated(BESIDE.format(**then, start=start, more=more_then), name="again")
+    again = again.window(0, 0.8)
+    close = {"rtol": 1e-7, "atol": 1e-9}
+    np.testing.assert_allclose(window.position[:], again.position[:], **close)
+    for own, other in zip(window.sides, again.sides, strict=True):
+        assert rounded(own) == rounded(other)
+    times = np.linspace(0, 0.7, 9 if more_then == "" else 8)
+    for name in ("corners_at", "accessible_area"):
+        found, expected = (getattr(one, name)(times) for one in (window, again))
+        np.testing.assert_allclose(found, expected, **close, err_msg=name)
+    np.testing.assert_allclose(window.bounds, again.bounds, **close)
+    for name in {"virial_pressure", "work", "side_impulse"} & {*again.observables}:
+        found, expected = (one.observable(name).value for one in (window, again))
+        np.testing.assert_allclose(found, expected, **close, err_msg=name)
+    assert window.nature == again.nature
+
+
+def test_a_saved_simulation_has_the_laws_after_its_changes(tmp_path):
+    """Its file contains them, together with all changes so far."""
+    with Simulation(BOX.format(start="temperature = 1", end=2)) as box:
+        box.advance(time=0.1).change({"contact.wall_restitution": 0.5, "box.gravity": [0, -1]})
+        box.schedule(0.2, {"contact.restitution": 0.8})
+        box.schedule(0.4, {"contact.restitution": 0.6})
+        run = saved(box.advance(time=0.3), tmp_path / "box.h5")
+    (window,) = run.windows()
+    assert window.start == 0.2 and window.nature == run.window(0.3).nature
+    for part in (window, run.window(0)):
+        laws = part.parameters["contact"]
+        assert [laws["restitution"], laws["wall_restitution"]] == [0.8, 0.5]
+        assert part.gravity[1] == -1
+        assert not part.changes and "changed" not in part.nature
+
+
+def test_windows_without_frames_are_left_out_and_rounding_errors_of_times_ignored(simulated):
+    text = BOX.replace("frames_every_time = 0.05", "frames_every_time = 0.7")
+    text += "&change time = 1 set = 'contact.restitution=0.8' / "
+    text += "&change time = 1.1 set = 'contact.restitution=0.7' /"
+    text += "&change time = 2.1 set = 'contact.restitution=0.6' /"
+    whole = simulated(text.format(start="temperature = 1", end=2.5))
+    assert whole.time[3] < 2.1  # 3 times 0.7
+    assert [part.restitution for part in whole.windows()] == [0.9, 0.7, 0.6]
+    assert [len(part) for part in whole.windows()] == [2, 1, 2]
+    late = whole.window(0.1).window(2.0)
+    assert len(late) == 2 and late.time[0] == 0 and late.restitution == 0.6
+
+
+def test_tables_and_warnings_name_the_window(simulated):
+    whole = simulated(CHANGED)
+    table = package.analyse("energy", whole.windows()).table
+    expected = [f"gas.h5 (t = {k} to {k + 1})" for k in (0, 1)] + ["gas.h5 (from t = 2)"]
+    assert [row["run"] for row in table] == expected
+    assert "the window from t = 1 to 2" in repr(whole.window(1, 2))
+    provenance = whole.window(1, 2).provenance
+    assert provenance["git_commit"] == whole.provenance["git_commit"]
+    assert "wall_time" not in provenance
+
+
+def test_windows_of_one_run_have_a_structure_of_their_own(gas):
+    run = gas(frames=0.05)
+    first, second = run.window(0, 0.5), run.window(0.5)
+    each = [package.analyse("correlations", one, equilibration=0).table for one in (first, second)]
+    both = package.analyse("correlations", [first, second], equilibration=0).table
+    local = [table[0]["psi6_local"] for table in (*each, both)]
+    assert local[2] == pytest.approx(np.mean(local[:2]))
 
 
 #: Settings of which a test draws, for a system with two sides, an obstacle and gravity.
 SETTINGS = [
     "contact.restitution=0.7",
     "contact.restitution=",
+    "Contact.Restitution=0.85",
     "contact.wall_restitution=0.5",
     "contact.wall_restitution=",
     "contact.wall_rule=normal",
@@ -124,7 +250,9 @@ SETTINGS = [
     "box.gravity=0, -1",
     "box.gravity(1)=1d-1",
     "box.gravity=2*0.5",
-    "drive.kind='noise' drive.interval=0.1 drive.strength=0.2",
+    "drive.kind='noise' drive.interval=0.1 drive.strength=0.2 drive.species=''",
+    "obstacle.post.rule='normal'",
+    "obstacle.post.rule=",
     "side.left.temperature=2",
     "side.left.temperature=",
     "side.right.restitution=0.6",
@@ -137,14 +265,14 @@ SETTINGS = [
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_changed_parameters_are_those_of_the_simulation(seed):
-    """The engine keeps its own list of values."""
+def test_changed_parameters_are_those_of_the_simulation(seed, tmp_path):
+    """The engine keeps its own list of values, which a saved simulation contains."""
     rng = np.random.default_rng(seed)
-    text = BOX.format(start="temperature = 1", end=1) + "&side name = 'left' / "
-    text += "&side name = 'right' / &side name = 'top' /"
+    text = BOX.format(start="temperature = 1", end=1) + " &side name = 'left' restitution = 0.9 /"
+    text += "&side name = 'right' / &side name = 'top' / ! wall_restitution = ..."
     rough = "restitution = 0.9 tangential_restitution = 0.5"
-    with Simulation(text.replace("restitution = 0.9", rough) if seed % 2 else text) as box:
-        before = box.parameters
+    with Simulation(text.replace("restitution = 0.9", rough, 1) if seed % 2 else text) as box:
+        before = saved(box, tmp_path / "before.h5").parameters
         for k in range(6):
             box.advance(time=0.01 * (k + 1))
             chosen = str(rng.choice(SETTINGS)).replace(", ", ",").split(" ")
@@ -152,13 +280,19 @@ def test_changed_parameters_are_those_of_the_simulation(seed):
                 box.change(dict(one.split("=", 1) for one in chosen))
             except package.ProgramError:
                 continue  # such as rotation, which must be present from the start
-        after = box.parameters
+        after = saved(box, tmp_path / "after.h5").parameters
     found = changed(before, changes_in(after.pop("changes", "")))
     for group in ("box", "contact", "drive"):
         assert known(found[group]) == known(after[group]), group
     for side in after["side"]:
         assert in_both(found["side"][side], after["side"][side])
     assert in_both(found["obstacle"], after["obstacle"])
+
+
+def saved(box, path):
+    """Return the saved state of a simulation as an unfinished run."""
+    box.save(path)
+    return read_run(f"{path}.part")
 
 
 def in_both(found, expected):
@@ -176,6 +310,12 @@ def known(values):
         return values
     numbers = [None if value != value else value for value in np.ravel(values).tolist()]
     return None if set(numbers) <= {None} else numbers
+
+
+def rounded(values):
+    """Return values of variables in a form that can be compared."""
+    texts = {name: own for name, own in values.items() if isinstance(own, str)}
+    return {name: np.round(own, 9) for name, own in values.items() if name not in texts} | texts
 
 
 def test_values_are_read_as_in_an_input():

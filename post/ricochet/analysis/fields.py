@@ -109,7 +109,7 @@ def oscillation_notes(runs: list[Run], skip: float | None, species: str | None) 
             share = np.nan_to_num(mean.var(axis=0) / scatter)
         for axis in np.flatnonzero(share > OSCILLATION + FEWEST_DISKS / own.sum()).tolist():
             notes.append(
-                f"{run.path.name}: kT_{'xy'[axis]} contains a flow that varies with time; the "
+                f"{run.label}: kT_{'xy'[axis]} contains a flow that varies with time; the "
                 f"motion of the centre of mass is {100 * share[axis]:.0f} % of kT_{'xy'[axis]}"
             )
     return notes

@@ -486,7 +486,7 @@ def warn(figure: Figure, notes: Sequence[str]) -> None:
 
 def save(figure: Figure, path: Path, runs: list[Run], title: str) -> None:
     """Save a figure with metadata that name the runs, creating missing folders."""
-    sources = ", ".join(run.path.name for run in runs[:20]) + (", ..." if len(runs) > 20 else "")
+    sources = ", ".join(run.label for run in runs[:20]) + (", ..." if len(runs) > 20 else "")
     commits = sorted({str(run.provenance.get("git_commit", "unknown")) for run in runs})
     origin = f"{sources} (ricochet {', '.join(commits)})"
     if path.suffix not in (".pdf", ".svg", ".png"):

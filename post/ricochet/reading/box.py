@@ -107,15 +107,19 @@ class BoxResults(Results):
     @cached_property
     def piston_positions(self) -> dict[int, Series]:
         """Position of each piston and each changed side over time, by its index in `sides`."""
-        names = (change.name.split(".") for change in self.changes)
+        return {k: self.observable(f"sides/{SIDES[k]}/position") for k in self._free_sides}
+
+    @property
+    def _free_sides(self) -> list[int]:
+        """Indices in `sides` of the pistons, and of the sides whose motion is changed."""
+        names = (change.name.lower().split(".") for change in self.changes)
         new = {name[1] for name in names if name[0] == "side" and name[-1] in MOVED}
-        free = [
+        return [
             k
             for k, side in enumerate(self.sides)
             if side.get("motion") == "piston"
             or (SIDES[k] in new and f"sides/{SIDES[k]}/position" in self.observables)
         ]
-        return {k: self.observable(f"sides/{SIDES[k]}/position") for k in free}
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:

@@ -2,12 +2,13 @@
 
 import copy
 import re
-from collections.abc import Iterable, Mapping
-from itertools import groupby
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import groupby, product
 from typing import Any
 
 import numpy as np
 
+from .nature import known, rows_of
 from .records import Change
 
 #: Variables of the motion of a side. A new motion drops those of the former one.
@@ -22,6 +23,31 @@ OF_MOTION = {
     "mass",
     "force",
 }
+#: Defaults of the variables that may change, except those that follow other variables or are none.
+DEFAULTS: dict[str, dict[str, Any]] = {
+    "box": {"gravity": np.zeros(2)},
+    "contact": {
+        "restitution": 1.0,
+        "restitution_law": "constant",
+        "wall_rule": "velocity",
+        "contact_time": 0.0,
+        "tangential_restitution": -1.0,
+        "inertia": 0.5,
+    },
+    "drive": {"kind": "none", "species": ""},
+    "side": {"open": False, "motion": "still", "surface_velocity": 0.0},
+    "obstacle": {"surface_velocity": 0.0},
+    "wall": {"surface_velocity": 0.0},
+    "source": {"count": 1, "start_time": 0.0},
+}
+#: Defaults of variables that apply only to some motions of a side or kinds of driving.
+DEFAULTS_OF: dict[str, dict[str, Any]] = {
+    "sine": {"phase": 0.0},
+    "parabolic": {"phase": 0.0},
+    "constant_velocity": {"start_time": 0.0},
+    "noise": {"keep_momentum": True},
+    "active": {"rotational_diffusion": 0.0, "turning_rate": 0.0},
+}
 #: Variables of contacts whose default is the value of another one.
 SOURCES = {
     "wall_restitution": "restitution",
@@ -29,50 +55,79 @@ SOURCES = {
     "wall_friction": "friction",
 }
 #: Variables of boundaries whose default is the value of a variable of contacts.
-OF_WALLS = {
+OF_WALLS = {  # the rule determines whether the last two apply
+    "rule": "wall_rule",
     "restitution": "wall_restitution",
     "tangential_restitution": "wall_tangential_restitution",
     "friction": "wall_friction",
-    "rule": "wall_rule",
 }
+#: Variables among them that apply only to boundaries with the rule 'normal'.
+OF_NORMAL_RULE = {"tangential_restitution", "friction"}
+#: The last parts of the names of laws, which drop the variables of the former law.
+LAWS = (".motion", ".kind")
+#: Groups that are stored as columns.
+COLUMNS = ("obstacle", "wall")
 
 
 def changed(parameters: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
     """Return the parameters of a run after changes; its lists of changes are left out."""
     lists = ("change", "changes")
     found = {name: copy.deepcopy(own) for name, own in parameters.items() if name not in lists}
-    # Variables named by the input itself; its changes name others as GROUP.VARIABLE.
-    given = set(re.findall(r"(?<![\w.])\w+", str(found.get("input", "")).lower()))
-    given |= set(re.findall(r"\w+", str(found.get("overrides", "")).lower()))
+    given = set(given_in(str(found.get("input", "")), str(found.get("overrides", ""))))
     for _, together in groupby(changes, key=lambda change: change.time):
-        before = dict(found.get("contact", {}))
-        # A new motion comes first, because it drops variables that the same change may set.
-        for change in sorted(together, key=lambda change: not change.name.endswith(".motion")):
-            assign(found, change)
-            name = change.name.rpartition(".")[2]
-            given = given | {name} if change.value else given - {name}
-        derive(found, before, given)
+        # A new law comes first, because it drops variables that the same change may set.
+        for change in sorted(together, key=lambda one: not one.name.lower().endswith(LAWS)):
+            name = assign(found, change)
+            given = given | {name} if change.value.strip() else given - {name}
+        derive(found, given)
     return found
 
 
-def assign(parameters: dict[str, Any], change: Change) -> None:
-    """Assign the new value of a variable, or remove the variable if its default is restored."""
-    group, *member, last = change.name.split(".")
+def given_in(text: str, overrides: str) -> Iterator[str]:
+    """Yield the full names, such as side.left.restitution, of the variables that an input gives."""
+    group, name, own, counts = "", "", list[str](), dict[str, int]()
+    token = r"'[^']*'|\"[^\"]*\"|!.*|&\s*\w+|/|\w+\s*(?=(?:\([^)]*\)\s*)?=)"
+    for match in re.finditer(token, text):
+        word = match[0].strip().lower()
+        if word.startswith("&"):
+            group = word[1:].strip()
+            counts[group] = counts.get(group, 0) + 1
+            name, own = f"{group}{counts[group]}" if group in COLUMNS else "", []
+        elif word == "/":
+            yield from (".".join(filter(None, (group, name, one))) for one in own)
+        elif word[0] in "'\"" and own and own[-1] == "name":
+            name = word[1:-1].strip()
+        elif word[0] not in "'\"!":
+            own.append(word)
+    for line in overrides.lower().splitlines():
+        where, _, value = line.partition("=")
+        if value.strip():
+            yield re.sub(r"\(.*", "", where).strip()
+
+
+def assign(parameters: dict[str, Any], change: Change) -> str:
+    """Assign the new value of a variable or, for an empty one, its default; return its name."""
+    group, *member, last = change.name.lower().split(".")
     name, _, element = last.partition("(")
+    name, value = name.strip(), value_of(change.value)
+    if value is None:
+        value = copy.copy(DEFAULTS.get(group, {}).get(name))
+    full = ".".join([group, *member, name])
     own = parameters.setdefault(group, {})
-    value = value_of(change.value)
-    if group in ("obstacle", "wall"):  # stored as columns
-        row = list(own["name"]).index(member[0])
-        empty: Any = "" if isinstance(value, str) else np.nan
-        column = list(own.get(name, [empty] * len(own["name"])))
-        column[row] = empty if value is None else value
-        own[name] = np.array(column) if empty != "" else column
-        return
+    if group in COLUMNS:
+        assign_in_column(own, member, name, value)
+        return full
     if member:
-        own = own.setdefault(member[0], {"name": member[0]})
-    if name == "motion":
-        for former in OF_MOTION:
+        names = {one.lower(): one for one in own}
+        of_name = {"name": member[0], **DEFAULTS.get(group, {})}
+        own = own.setdefault(names.get(member[0], member[0]), of_name)
+    if name in ("motion", "kind"):
+        dropped = OF_MOTION if name == "motion" else DEFAULTS_OF["noise"] | DEFAULTS_OF["active"]
+        for former in dropped:
             own.pop(former, None)
+        own |= DEFAULTS_OF.get(value, {})
+    if value is None:
+        value = DEFAULTS_OF.get(own.get("motion", own.get("kind", "")), {}).get(name)
     if value is None:
         own.pop(name, None)
     elif element:
@@ -80,30 +135,48 @@ def assign(parameters: dict[str, Any], change: Change) -> None:
         own[name][int(element.rstrip(") ")) - 1] = value
     else:
         own[name] = value
+    return full
 
 
-def derive(parameters: dict[str, Any], before: Mapping[str, Any], given: set[str]) -> None:
-    """Let variables that the input does not give follow those from which they take their values.
+def assign_in_column(columns: dict[str, Any], member: list[str], name: str, value: Any) -> None:
+    """Assign the value of a variable of a boundary in the box; None if it has no value."""
+    names = [str(one).lower() for one in columns["name"]]
+    row = names.index(member[0]) if member else 0
+    if name == "rule":  # stored as 1 for the rule 'normal'
+        name, value = "normal", int(value == "normal")
+    column = np.array(columns.get(name, np.full(len(names), np.nan)), dtype=float)
+    column[row] = np.nan if value is None else value
+    columns[name] = column
 
-    `before` contains the variables of contacts before the change, and `given` all words of the
-    input. A boundary whose value equals the former default is taken to have this default.
-    """
-    contact = parameters.get("contact", {})
-    for name, source in SOURCES.items():
-        if name not in given and name in before and source in contact:
-            contact[name] = contact[source]
-    for name, source in OF_WALLS.items():
-        old, new = before.get(source), contact.get(source)
-        if old is None or new is None or old == new:
-            continue
-        for side in parameters.get("side", {}).values():
-            if side.get(name) == old:
-                side[name] = new
-        for group in ("obstacle", "wall"):
-            columns = parameters.get(group, {})
-            if name in columns:
-                values = [new if one == old else one for one in columns[name]]
-                columns[name] = values if isinstance(new, str) else np.array(values)
+
+def derive(parameters: dict[str, Any], given: set[str]) -> None:
+    """Let variables that are not `given` follow those from which they take their values."""
+    contact = parameters.setdefault("contact", {})
+    if "contact.wall_restitution" not in given:
+        contact["wall_restitution"] = contact.get("restitution", 1.0)
+    for group, (name, source) in product(("side", *COLUMNS), OF_WALLS.items()):
+        own = parameters.get(group, {})
+        each = rows_of(own) if group in COLUMNS else [*own.values()]
+        for boundary in each:
+            full = f"{group}.{boundary['name'].lower()}.{name}"
+            short = f"{group}.{name}" if len(each) == 1 else full
+            if not {full, short} & given:
+                value = of_walls(contact, source, given) if applies(name, boundary) else None
+                assign(parameters, Change(0.0, full, "" if value is None else str(value)))
+
+
+def applies(name: str, boundary: Mapping[str, Any]) -> bool:
+    """Return whether one of the variables `OF_WALLS` applies to a boundary."""
+    if known(boundary.get("temperature")):
+        return False
+    normal = boundary.get("rule") == "normal" or boundary.get("normal") == 1
+    return normal or name not in OF_NORMAL_RULE
+
+
+def of_walls(contact: Mapping[str, Any], name: str, given: set[str]) -> Any:
+    """Return the value of a variable of contacts for walls; None if it has none."""
+    source = SOURCES.get(name, name)
+    return contact.get(name if f"contact.{name}" in given else source)
 
 
 def value_of(text: str) -> Any:

@@ -132,10 +132,15 @@ class Frames(Values):
     # keeps a temporary file in existence
     folder: object = field(default=None, repr=False)
     first: int = 0  # index in the file of the first frame
+    counted_from: int | None = None  # frame in the file at which the values, counts, are zero
 
     def part(self, start: int, end: int) -> "Frames":
         """Return the frames from `start` up to, but not including, `end`."""
         return replace(self, shape=(end - start, *self.shape[1:]), first=self.first + start)
+
+    def from_zero(self) -> "Frames":
+        """Return the counts since the first frame, in which they are zero."""
+        return replace(self, counted_from=self.first)
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -190,6 +195,8 @@ class Frames(Values):
                 values = data[chosen[0] : chosen[-1] + 1 : steps[0]]
             else:  # much faster than indexing with a list in h5py
                 values = np.stack([data[k] for k in chosen])
+            if self.counted_from is not None:
+                values = values - data[self.counted_from]
         return values.astype(float if values.dtype.kind == "f" else np.int64)
 
 

@@ -62,7 +62,17 @@ class Run(PressureResults):
         """Return a one-line description of the run."""
         kinds = ", ".join(f"{np.sum(kind.disks)} {kind.name}" for kind in self.by_species)
         frames = f"{self.n_frames} frame{'s' * (self.n_frames > 1)}, t = {span(self.time)}"
-        return f"<Run {self.path}: {kinds}; {frames}>"
+        return f"<Run {self._place}: {kinds}; {frames}>"
+
+    @property
+    def _place(self) -> str:
+        """Path of the file, and in a window its times."""
+        return str(self.path)
+
+    @property
+    def label(self) -> str:
+        """Name of the file, and in a window its times, for tables and warnings."""
+        return self.path.name
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -190,9 +200,14 @@ class Run(PressureResults):
         image = self.image[frame]
         place = self.position[frame] + image * self.edges
         if self.shear_rate != 0:
-            slide = self.shear_rate * self.edges[1] * self.time[frame]
+            slide = self.shear_rate * self.edges[1] * self._shear_time[frame]
             place[..., 0] += image[..., 1] * np.asarray(slide)[..., None]
         return place
+
+    @property
+    def _shear_time(self) -> np.ndarray:
+        """Time (T,) of each frame since the images of a sheared box were aligned."""
+        return self.time
 
     def displacement(self, frame: Index, origin: int = 0) -> np.ndarray:
         """Return the distance of each disk from its position in a reference frame.
@@ -360,7 +375,7 @@ class Run(PressureResults):
         Returns
         -------
         list of Run
-            the windows in chronological order
+            the windows in chronological order, except those without frames
 
         Examples
         --------
@@ -368,7 +383,14 @@ class Run(PressureResults):
         1
         """
         times = sorted({0.0, *(change.time for change in self.changes), np.inf})
-        return [self.window(start, end) for start, end in pairwise(times)]
+        from .windows import within
+
+        spans = [
+            (start, end)
+            for start, end in pairwise(times)
+            if len(self.time[within(self.time, start, end)])
+        ]
+        return [self.window(start, end) for start, end in spans]
 
     @property
     def restitution(self) -> float:

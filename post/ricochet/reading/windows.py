@@ -5,21 +5,21 @@
 
 In a window all times are measured from its start. Counts and sums that the program accumulates
 from the start of the run, such as collisions and dissipated energy, begin at zero with the first
-sample of the window.
+sample of the window, and those of single disks with its first frame.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from .arrays import Index, as_index
+from .box import displaced
+from .changed import changed
 from .files import RunError
 from .frames import Frames, Series
 from .nature import Nature
 from .reader import Run
-from .changed import changed
 from .records import EventLog
 from .results import SIDES
 
@@ -42,8 +42,13 @@ SUMS = {
 SUMS_OF_BOUNDARIES = ("/impulse", "/energy_to_disks")
 #: The last parts of the names of counts that do not accumulate.
 PRESENT_COUNTS = ("inside", "/particle_number")
+#: Counts of single disks that accumulate from frame to frame.
+COUNTS_OF_DISKS = ("event_count", "recycled")
 #: Traits that a run does not lose by a change of its laws.
 LASTING = {"open", "collapsed"}
+#: Provenance that describes the whole run.
+OF_WHOLE = {"wall_time", "collisions_per_second", "events_on_one_core"}
+ROUNDING = 1e-12  # relative rounding error of times
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,14 +59,24 @@ class Window(Run):
     start: float
     end: float
 
+    @property
+    def _place(self) -> str:
+        return f"{self.path}, {self._span}"
+
+    @property
+    def label(self) -> str:
+        """Name of the file with the times of the window, for tables and warnings."""
+        times = f"from t = {self.start:g}" if np.isinf(self.end) else self._times
+        return f"{self.path.name} ({times})"
+
     def observable(self, name: str) -> Series:
         """Return the samples of an observable in the window; see `Run.observable`."""
         time, value = self.whole.observable(name)
-        inside = self._contains(time)
-        if not inside.any():
+        inside = within(time, self.start, self.end)
+        if not len(time[inside]):
             some = "set output.observables_every_time"
             raise RunError(f"{self.path}: has no observables in {self._span}; {some}")
-        own, found = time[inside] - self.start, value[inside]
+        own, found = since(self.start, time[inside]), value[inside]
         if name == "virial_pressure":
             found = found + self._pressure_change(own)
         elif accumulates(name, value):
@@ -71,67 +86,77 @@ class Window(Run):
     def _pressure_change(self, time: np.ndarray) -> np.ndarray:
         """Return the change of `virial_pressure` if the virial is averaged from the start (T,)."""
         samples, virial = self.whole.observable("virial")
-        virial = virial[self._contains(samples)]
+        virial = virial[within(samples, self.start, self.end)]
         elapsed = time + self.start
         before = np.divide(virial, 2 * elapsed, out=np.zeros_like(virial), where=elapsed > 0)
         gain, passed = virial - virial[0], time - time[0]
-        since = np.divide(gain, 2 * passed, out=np.zeros_like(virial), where=passed > 0)
-        return (since - before) / self.accessible_area(time)
+        since_start = np.divide(gain, 2 * passed, out=np.zeros_like(virial), where=passed > 0)
+        return (since_start - before) / self.accessible_area(time)
 
     @cached_property
     def _event_log(self) -> EventLog:
         log = self.whole.event_log()
-        inside = self._contains(log.time)
+        inside = within(log.time, self.start, self.end)
         parts = {k: part[inside] for k, part in log._asdict().items() if part is not None}
-        return EventLog(**parts | {"time": parts["time"] - self.start})
+        return EventLog(**parts | {"time": since(self.start, parts["time"])})
 
-    def unwrapped(self, frame: Index) -> np.ndarray:
-        """Return positions that are continuous in time; see `Run.unwrapped`."""
-        first = int(np.searchsorted(self.whole.time, self.start + self.time[0]))
-        return self.whole.unwrapped(first + np.arange(self.n_frames)[as_index(frame)])
-
-    def corners_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners of the box at times in the window; see `Run.corners_at`."""
-        return self.whole.corners_at(np.asarray(time) + self.start)
-
-    def open_at(self, time: float | np.ndarray) -> np.ndarray:
-        """Return which sides are open at times in the window; see `Run.open_at`."""
-        return self.whole.open_at(np.asarray(time) + self.start)
-
-    def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
-        """Return the accessible area at times in the window; see `Run.accessible_area`."""
-        return self.whole.accessible_area(np.asarray(time) + self.start)
-
-    @cached_property
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower left and upper right corner of the region that the box covers in the whole run."""
-        return self.whole.bounds
+    @property
+    def _shear_time(self) -> np.ndarray:
+        return self.time + self.start
 
     @cached_property
     def piston_positions(self) -> dict[int, Series]:
-        """Position of each piston and each changed side over time, by its index in `sides`."""
-        names = {k: f"sides/{SIDES[k]}/position" for k in self.whole.piston_positions}
-        return {k: self.observable(name) for k, name in names.items()}
+        """Position of each piston and each changed side over time, by its index in `sides`.
+
+        The samples before and after the window are included, to interpolate between samples.
+        """
+        found = {}
+        for k in self._free_sides:
+            time, value = self.whole.observable(f"sides/{SIDES[k]}/position")
+            inside = within(time, self.start, self.end)
+            some = slice(max(0, inside.start - 1), inside.stop + 1)
+            found[k] = Series(time[some] - self.start, value[some])
+        return found
 
     @cached_property
     def nature(self) -> Nature:
         """Traits of the run in the window, which determine the applicable theories."""
         return Nature(super().nature | self.whole.nature & LASTING)
 
-    def _contains(self, time: np.ndarray) -> np.ndarray:
-        """Return which times (T,) of the whole run are in the window."""
-        return (time >= self.start) & (time < self.end)
+    @property
+    def termination_note(self) -> str:
+        """Reason why the run ended early, if the window extends to the end of the run."""
+        ended = since(self.start, self.whole.time[-1:]) <= self.time[-1]
+        return self.whole.termination_note if ended or "collapsed" in self.nature else ""
+
+    @property
+    def _times(self) -> str:
+        return f"t = {self.start:g} to {self.end:g}"
 
     @property
     def _span(self) -> str:
-        return f"the window from t = {self.start:g} to {self.end:g}"
+        return f"the window from {self._times}"
+
+
+def within(time: np.ndarray, start: float, end: float) -> slice:
+    """Return which of the increasing times (T,) are in a window; rounding errors do not count."""
+    return slice(*map(int, np.searchsorted(time, np.array([start, end]) * (1 - ROUNDING))))
+
+
+def since(start: float, time: np.ndarray) -> np.ndarray:
+    """Return times (T,) measured from the start of a window, without negative rounding errors."""
+    return np.maximum(time - start, 0.0)
 
 
 def window_of(run: Run, start: float, end: float) -> Window:
     """Return a window of a run, from the time `start` up to, but not including, `end`."""
     if not 0 <= start < end:
         raise RunError(f"{run.path}: no window begins at {start:g} and ends at {end:g}")
-    first, last = (int(k) for k in np.searchsorted(run.time, [start, end]))
+    if isinstance(run, Window):
+        inner = window_of(run.whole, run.start + start, min(run.end, run.start + end))
+        return replace(inner, units=run.units)
+    inside = within(run.time, start, end)
+    first, last = inside.start, inside.stop
     if first == last:
         some = f"has no frame from t = {start:g} to {end:g}, only from {run.time[0]:g} to"
         raise RunError(f"{run.path}: {some} {run.time[-1]:g}; see output.frames_every_time")
@@ -141,27 +166,68 @@ def window_of(run: Run, start: float, end: float) -> Window:
 
     kept = {entry.name: part(getattr(run, entry.name)) for entry in fields(Run)}
     kept["disk_data"] = {name: part(values) for name, values in run.disk_data.items()}
-    kept["time"] = run.time[first:last] - start
+    for name in COUNTS_OF_DISKS if run.present else (*COUNTS_OF_DISKS, "image"):
+        kept[name] = kept[name] and kept[name].from_zero()
+    kept["time"] = since(start, run.time[first:last])
+    kept["provenance"] = {k: v for k, v in run.provenance.items() if k not in OF_WHOLE}
     kept["parameters"] = laws_in(run, start, end)
-    kept["provenance"] = {name: run.provenance.get(name, "") for name in ("note", "host")}
-    lower, upper = run.corners_at(start)
-    still = np.array([side.get("motion") not in ("sine", "parabolic") for side in run.sides])
-    kept["lower"] = np.where(still[::2], lower, run.lower)
-    kept["edges"] = np.where(still[1::2], upper, run.upper) - kept["lower"]
+    box = kept["parameters"]["box"]
+    kept["lower"], kept["edges"] = np.array(box["lower"]), np.subtract(box["upper"], box["lower"])
     return Window(**kept, whole=run, start=start, end=end)
 
 
 def laws_in(run: Run, start: float, end: float) -> dict[str, Any]:
     """Return the values of the input variables at `start`, with the changes up to `end` listed."""
-    parameters = changed(run.parameters, [one for one in run.changes if one.time <= start])
-    for side in parameters.get("side", {}).values():
-        if side.get("motion") == "constant_velocity" and side.get("end_time", np.inf) <= start:
-            side["motion"] = "still"
-    later = [one for one in run.changes if start < one.time < end]
+    # The output of a saved simulation begins with the laws at the time of saving.
+    first = max(start, float(run.provenance.get("saved_at", 0.0)))
+    made = [one for one in run.changes if one.time <= first * (1 + ROUNDING)]
+    later = [one for one in run.changes[len(made) :] if one.time < end * (1 - ROUNDING)]
+    parameters = changed(run.parameters, made)
+    set_clocks(parameters, start)
+    set_corners(parameters, run, start)
     if later:
         lines = [f"{one.time - start:.17g} {one.name}={one.value}\n" for one in later]
         parameters["changes"] = "".join(lines)
     return parameters
+
+
+def set_clocks(parameters: dict[str, Any], start: float) -> None:
+    """Measure all times in the laws of sides and sources from `start`."""
+    for own in [*parameters.get("side", {}).values(), *parameters.get("source", {}).values()]:
+        if own.get("motion") in ("sine", "parabolic"):
+            own["phase"] = (own.get("phase", 0.0) + start / own["period"]) % 1
+        if own.get("motion") == "constant_velocity" and own["end_time"] <= start:
+            own["motion"] = "still"
+            for name in ("velocity", "start_time", "end_time"):
+                own.pop(name, None)
+        if "start_time" in own:
+            own["start_time"] = max(0.0, own["start_time"] - start)
+        if "end_time" in own:
+            own["end_time"] = own["end_time"] - start
+
+
+def set_corners(parameters: dict[str, Any], run: Run, start: float) -> None:
+    """Let the box extend to the positions of its sides at `start`; oscillating ones are kept."""
+    sides = [parameters.get("side", {}).get(name, {}) for name in SIDES]
+    places = np.stack(run.corners_at(start), axis=1).ravel()
+    for k, side in enumerate(sides):
+        if side.get("motion") in ("sine", "parabolic"):
+            places[k] = (run.lower, run.upper)[k % 2][k // 2]
+        elif k in run.piston_positions and side.get("motion") != "piston":
+            places[k] = place_at_start(run, k, side, start, places[k])
+        side.pop("position", None)
+    parameters["box"]["lower"], parameters["box"]["upper"] = places[::2], places[1::2]
+
+
+def place_at_start(run: Run, k: int, side: dict[str, Any], start: float, near: float) -> float:
+    """Return the position of a side at `start`: exactly, if a sample follows before a change."""
+    time, place = run.piston_positions[k]
+    later = [one.time for one in run.changes if one.time > start * (1 + ROUNDING)]
+    inside = within(time, start, min([*later, np.inf]))
+    if inside.start == inside.stop:
+        return near
+    moved = float(displaced(side, time[inside][0] - start))
+    return float(place[inside][0]) - (-1) ** k * moved
 
 
 def accumulates(name: str, value: np.ndarray) -> bool:

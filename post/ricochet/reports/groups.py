@@ -37,7 +37,7 @@ def together(runs: list[Run]) -> list[tuple[None, list[Run]]]:
 
 def each_run(runs: list[Run]) -> list[tuple[str, list[Run]]]:
     """Put each run into a group of its own."""
-    return [(run.path.name, [run]) for run in runs]
+    return [(run.label, [run]) for run in runs]
 
 
 def by_number(runs: Iterable[Run]) -> list[tuple[int, list[Run]]]:

@@ -175,7 +175,7 @@ def late_frames(run: Run, options: SimpleNamespace, warnings: list[str]) -> list
         start_of_steady_state(run, options.equilibration),
     )
     used = frames_from(run, start, options.min_separation, frames)
-    says = f"{run.path.name}: "
+    says = f"{run.label}: "
     if not used:
         used = [max(frames)]
         warnings.append(

@@ -171,14 +171,14 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
         time, lost = change(run)
         line = np.polynomial.Polynomial.fit(time, lost, 1)
         row: dict[str, Any]
-        row = {"run": run.path.name, "method": method(run), "of": balance(run)[1]}
+        row = {"run": run.label, "method": method(run), "of": balance(run)[1]}
         row |= {"total_energy": float(run.observable("total_energy").value[0])}
         row |= {"drift": float(line(time[-1]) - line(time[0]))}
         row |= {"spread": float(np.std(lost - line(time)))}
         rows.append(row | {"largest_change": float(np.abs(lost).max())})
     notes = ["Energies of species: means over windows of time; single samples are pale."]
     warnings = [
-        f"{run.path.name} has energies of its start and its end alone: set for example"
+        f"{run.label} has energies of its start and its end alone: set for example"
         " output.observables_every_time to see what happens between them"
         for run in groups[0].runs
         if len(run.observable("total_energy").time) < 3

@@ -293,7 +293,7 @@ def chosen_cells(options: SimpleNamespace, axis: int) -> tuple[int, int]:
 def warnings_of(groups: list[Group], options: SimpleNamespace, own: Fields) -> list[str]:
     """Return reasons why the state may not be steady, or why errors are unknown."""
     runs = [run for group in groups for run in group.runs]
-    cooling = [run.path.name for run in runs if run.nature.cooling]
+    cooling = [run.label for run in runs if run.nature.cooling]
     warnings = motion_notes(runs)
     warnings += [f"{name} loses energy and gains none: its state is not steady" for name in cooling]
     warnings += oscillation_notes(runs, options.equilibration, options.species)
@@ -355,7 +355,7 @@ def notes_of(runs: list[Run], found: Found, options: SimpleNamespace) -> list[st
     note = "Bars: standard errors, jackknife over blocks of time."
     notes = [note + " Band: error of the prediction." * (found.law is not None)]
     reasons = ((run, no_theory(run, found.axis)) for run in runs)
-    if why := next((f"{run.path.name} {why}" for run, why in reasons if why), ""):
+    if why := next((f"{run.label} {why}" for run, why in reasons if why), ""):
         law = "Enskog's theory of equal smooth elastic disks between two walls does not apply"
         notes.append(f"No predictions and no fluxes at walls: {law}, because {why}.")
     return notes

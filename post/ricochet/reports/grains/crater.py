@@ -118,7 +118,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     """Return the size of the crater in each run."""
     rows, warnings = [], []
     for group in groups:
-        (run,), name = group.runs, group.runs[0].path.name
+        (run,), name = group.runs, group.runs[0].label
         group.values = size = crater.crater(run)
         by_time = crater.ended_by_time(run, size)
         box = crater.box_takes_part(run, size.side_collisions)

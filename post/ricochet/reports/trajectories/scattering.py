@@ -92,7 +92,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     runs = groups[0].runs
     rows = sorted(map(scattering, runs), key=lambda row: row["b_over_R12"])
     warnings = [
-        f"{run.path.name}: a collision with a side changed the angle; stop the run before"
+        f"{run.label}: a collision with a side changed the angle; stop the run before"
         for run in runs
         if run.observable("side_collisions").value[-1].any()
     ]
