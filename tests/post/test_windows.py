@@ -1,5 +1,7 @@
 """Windows of a run: a part of it between two times is a run under the laws then in force."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -228,8 +230,25 @@ def test_tables_and_warnings_name_the_window(simulated):
     assert "wall_time" not in provenance
 
 
+def test_haffs_law_begins_with_the_first_sample(gas):
+    cadence = "frames_every_time = 0.1 observables_every_time = 0.1"
+    unlike = "0.1 mass = 1 temperature = 2 / &species name = 'b' packing_fraction = 0.1 count = 32"
+    for packing in (0.1, unlike):  # equal disks, and a mixture
+        run = gas(cadence=cadence, restitution=0.9, length=30, helfand=".false.", packing=packing)
+        each = [package.analyse("haff", run.window(start)) for start in (0.42, 0.5)]
+        for name in ("table", "further", "data"):
+            first, second = (str(getattr(one, name)) for one in each)
+            numbers = [re.findall(r"[\d.]+(?:e-?\d+)?", text) for text in (first, second)]
+            found, expected = (np.array(own, dtype=float) for own in numbers)
+            np.testing.assert_allclose(found, expected, rtol=1e-9)
+    with pytest.raises(RunError, match="has one sample"):
+        package.analyse("haff", run.window(0.42, 0.51))
+    with pytest.raises(RunError, match="a part of the run"):
+        package.analyse("cost", run.window(0.5))
+
+
 def test_windows_of_one_run_have_a_structure_of_their_own(gas):
-    run = gas(frames=0.05)
+    run = gas(length=100)
     first, second = run.window(0, 0.5), run.window(0.5)
     each = [package.analyse("correlations", one, equilibration=0).table for one in (first, second)]
     both = package.analyse("correlations", [first, second], equilibration=0).table

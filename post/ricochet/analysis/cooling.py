@@ -254,17 +254,22 @@ def counted_rate(run: Run) -> float:
     time, tau = run.collisions_per_disk
     first = min(int(np.searchsorted(tau, 1.0)), len(tau) - 1)
     slower = (1 - run.restitution**2) * tau[first] / 4
-    return float(tau[first] / time[first] * (np.expm1(slower) / slower if slower > 0 else 1))
+    return float(
+        tau[first] / (time[first] - time[0]) * (np.expm1(slower) / slower if slower > 0 else 1)
+    )
 
 
 def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return w0 t, collisions per disk and K / K(0) at each sample, all of shape (T,).
 
-    Refused is raised if Haff's law does not apply to the run.
+    Refused is raised if Haff's law does not apply to the run. In a window of a run, the first
+    sample may follow after its start.
     """
     time, tau = run.collisions_per_disk
+    if len(time) < 2:
+        raise RunError(f"{run.path}: has one sample of the energy, two are required")
     energy = moving_energy(run)
-    return time * first_rate(run), tau, energy / energy[0]
+    return (time - time[0]) * first_rate(run), tau, energy / energy[0]
 
 
 def soft_law(runs: list[Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:

@@ -205,6 +205,7 @@ def recorded(run: Run, name: str) -> float:
     if value <= 0:
         what = name.replace("_", " ")
         raise RunError(
-            f"{run.path}: contains no {what}: the run is not finished, or this number was 0"
+            f"{run.path}: contains no {what}: the run is not finished, this number was 0, or "
+            "--times selects a part of the run"
         )
     return value
