@@ -366,3 +366,8 @@ def test_scripts_and_analyses_take_a_window(simulated, tmp_path, capsys):
         assert code == 2 and problem in told
     with pytest.raises(RunError, match="no frame"):
         read_run(run.path).window(3.5)
+    with pytest.raises(ValueError, match="not a window of time"):
+        package.analyse("energy", run, times="5")
+    assert package.analyse("energy", run, times=None).table[0]["run"] == run.label
+    part, other = run.window(1, 2), run.window(1, 2)
+    assert part == part != other and {part, part} == {part}

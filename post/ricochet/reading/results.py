@@ -21,7 +21,7 @@ SIDES = ("left", "right", "bottom", "top")
 TENSORS = ("virial_tensor", "kinetic_tensor", "helfand_stress")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Results:
     """Results of one run, as stored in its output file."""
 

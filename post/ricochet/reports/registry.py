@@ -20,6 +20,9 @@ from .result import Result
 from .tables import once
 
 
+TIMES = Option("times", "window of time", convert=time_window)
+
+
 def accept(run: Run) -> None:
     """Accept any run."""
 
@@ -65,8 +68,8 @@ class Analysis:
                 units = units_of(value) if isinstance(value, str) else value
                 found = [replace(run, units=units) for run in found]
             elif name == "times":
-                span = time_window(value) if isinstance(value, str) else value
-                found = [run.window(*span) for run in found]
+                span = TIMES.value(value)
+                found = [run.window(*span) if span else run for run in found]
             elif name not in values:
                 known = [*values, "units", "times"]
                 hint = did_you_mean(name, known) or f"; there are {', '.join(known)}"
