@@ -8,6 +8,7 @@ import pytest
 import ricochet as package
 from ricochet import RunError, Simulation, read_run, write_start
 from ricochet.reading.changed import changed, value_of
+from ricochet.reading.paths import seen, turns_between
 from ricochet.reading.records import changes_in
 from ricochet.reading.windows import accumulates
 from synthetic_run import run_script
@@ -111,6 +112,22 @@ def test_counts_of_disks_begin_at_zero_also_in_a_sheared_box(simulated):
     counts = window.event_count[:]
     np.testing.assert_array_equal(counts, whole.event_count[late] - whole.event_count[6])
     assert counts[-1].sum() > counts[0].sum() == window.events_per_disk[0] == 0
+
+
+def test_paths_in_a_window_are_those_of_the_run(simulated):
+    """The event log of the window contains events before its first frame."""
+    whole = simulated(BOX.format(start="temperature = 1", end=0.4))
+    part = whole.window(0.17)
+    each = [(whole, [4, 5, 7]), (part, [0, 1, 3])]
+    logs = [run.event_log() for run, _ in each]
+    ends = [seen(run, log, own) for (run, own), log in zip(each, logs, strict=True)]
+    assert np.all(np.diff(ends[1]) > 0) and ends[1][0] > 0
+    turns = [
+        turns_between(run, log, own, end)
+        for (run, own), log, end in zip(each, logs, ends, strict=True)
+    ]
+    for found, expected, shift in zip(*turns[::-1], (0, 0, 0.17, 0), strict=True):
+        np.testing.assert_allclose(found + shift, expected, atol=1e-12)
 
 
 def test_a_window_of_a_window_is_a_window_of_the_run(simulated):

@@ -6,6 +6,7 @@ import numpy as np
 
 from .nature import KICKED
 from .reader import SIDES, EventLog, Run
+from .windows import Window, within
 
 
 class Turns(NamedTuple):
@@ -35,6 +36,10 @@ def why_unknown(run: Run, log: EventLog) -> str:
 
 def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
     """Return the number (T,) of logged events before each frame."""
+    if isinstance(run, Window):  # events may precede its first frame, at which its counts begin
+        first, logged = run.position.first - run.whole.position.first, run.whole.event_log()
+        earlier = within(logged.time, run.start, run.end).start
+        return seen(run.whole, logged, [first + k for k in frames]) - earlier
     if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
     # The number of events before a frame is calculated from the event counts of all disks. This is

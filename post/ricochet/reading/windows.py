@@ -66,8 +66,7 @@ class Window(Run):
     @property
     def label(self) -> str:
         """Name of the file with the times of the window, for tables and warnings."""
-        times = f"from t = {self.start:g}" if np.isinf(self.end) else self._times
-        return f"{self.path.name} ({times})"
+        return f"{self.path.name} ({self._times})"
 
     def observable(self, name: str) -> Series:
         """Return the samples of an observable in the window; see `Run.observable`."""
@@ -131,11 +130,13 @@ class Window(Run):
 
     @property
     def _times(self) -> str:
+        if np.isinf(self.end):
+            return f"from t = {self.start:g}"
         return f"t = {self.start:g} to {self.end:g}"
 
     @property
     def _span(self) -> str:
-        return f"the window from {self._times}"
+        return f"the window {'' if np.isinf(self.end) else 'from '}{self._times}"
 
 
 def within(time: np.ndarray, start: float, end: float) -> slice:
