@@ -24,29 +24,32 @@ Numbers = dict[str, tuple[float, float | None]]  # value and error (None if ther
 PAGES = ("exam", "gravity")
 TEXTS = {
     "mixture": """\
-Over eight seeds, the light disks end with ⟨K⟩ = {K_light} and the heavy disks with {K_heavy}
-(theory 1.25). The mean speeds are {v_light} (light disks; theory {v_light_theory}) and {v_heavy}
-(heavy disks; theory {v_heavy_theory}).
+The following values are means over eight seeds. The light disks end with ⟨K⟩ = {K_light} and the
+heavy disks with {K_heavy}. The theoretical value is 1.25. The mean speed of the light disks is
+{v_light} (theory {v_light_theory}), and that of the heavy disks is {v_heavy} (theory
+{v_heavy_theory}).
 """,
     "cooling": """\
-After 20 collisions per disk the temperature ratio of heavy and light disks is {ratio_1} for ξ = 1,
-{ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8 (eight seeds). For ξ < 1 the heavy disks are
-hotter than the light ones: the gas violates equipartition.
+After 20 collisions per disk the temperature of the heavy disks, divided by that of the light disks,
+is {ratio_1} for ξ = 1, {ratio_0.9} for ξ = 0.9 and {ratio_0.8} for ξ = 0.8. These are means over
+eight seeds. For ξ < 1 the heavy disks are hotter than the light disks, so the gas violates
+equipartition.
 """,
     "walls": """\
-After 20 collisions per disk the ratio K/K₀ is {left_velocity} with the walls of the exam, and
-{left_normal} with smooth walls (ξ = 0.8, eight seeds).
+For ξ = 0.8 and eight seeds, the ratio K/K₀ after 20 collisions per disk is {left_velocity} with the
+walls of the exam. With smooth walls it is {left_normal}.
 """,
     "crater": """\
-- *Size.* In a bed of 2000 grains {hit} are hit, and {displaced} move by more than their radius.
-  The displaced grains come from a region {width} wide and {depth} deep (means of eight beds).
-- *Mass.* The number of hit grains grows with the mass of the projectile to the power {hit_mass}.
-- *Speed.* The number of hit grains grows with the speed to the power {hit_speed}. The crater does
-  not depend on the speed.
+- *Size.* Of the 2000 grains in the bed, {hit} are hit, and {displaced} move by more than their
+  radius. The displaced grains come from a region {width} wide and {depth} deep. These numbers are
+  means over eight beds.
+- *Mass.* The number of grains hit grows as the mass of the projectile to the power {hit_mass}.
+- *Speed.* The crater does not depend on the speed: the fitted exponent of the number of grains hit
+  is {hit_speed}.
 - *Radius.* In a large bed the crater shrinks slowly with the radius of the projectile. In a small
   bed it grows with the radius, because a small projectile reaches the floor and loses its energy
-  there. In the figure all beds have 2000 grains, and the small projectiles of the open points reach
-  the floor, too.
+  there. All beds in the figure have 2000 grains. Open points are small projectiles that reach the
+  floor of such a bed.
 - *Restitution.* As ξ approaches 1 the crater grows to the whole bed.
 
 | grains in the bed | hit with radius 2 | radius 5 | radius 10 |
@@ -54,15 +57,16 @@ After 20 collisions per disk the ratio K/K₀ is {left_velocity} with the walls 
 | 5000 | 1043 | 951 | 905 |
 | 1000 | 537 | 610 | 663 |
 
-How large must the bed be? A bed needs about 7.5 M (1/f - 1)/(1 - ξ²) grains, where M is the mass
-ratio and f the fraction of the energy that is left at the end. For this exercise the estimate is
-2250 grains. The slightly smaller bed of 2000 grains is acceptable, because fewer than 20 collisions
-with walls occur. If more wall collisions occur, the scripts exclude the crater from the fit (open
-symbols).
+How large must the bed be? A bed needs about 7.5 M (1/f - 1)/(1 - ξ²) grains. Here M is the mass
+ratio, and f is the fraction of the energy that is left at the end. This exercise would need 2250
+grains. The slightly smaller bed of 2000 grains is acceptable, because fewer than 20 collisions with
+walls occur. If more wall collisions occur, the scripts exclude the crater from the fit and draw it
+as an open symbol.
 """,
     "energy": """\
 With every method the total energy is constant to a relative error of {energy_change}. The table
-compares the measured and the calculated fraction of missed collisions (32 pairs of runs of 520 s).
+compares the measured fraction of missed collisions with the calculated fraction. It was measured in
+32 pairs of runs of 520 s.
 
 | dt | missed (%) | formula (%) |
 |---|---|---|
@@ -71,8 +75,8 @@ compares the measured and the calculated fraction of missed collisions (32 pairs
 | 0.004 | {missed_0.004} | {expected_0.004} |
 """,
     "equipartition": """\
-The mean energies of both species agree within 10 % after a time T, which hardly depends on v₀. Among
-the four values of v₀, the shortest T is ({T_first}) s, and the longest T is ({T_last}) s.
+After a time T the mean energies of the two species agree within 10 %. The time T hardly depends on
+v₀. Among the four values of v₀, the shortest T is ({T_first}) s, and the longest T is ({T_last}) s.
 """,
     "laws": """\
 The table lists the slopes measured with seed 1, divided by the slopes of the exponential laws. The
