@@ -35,7 +35,7 @@ CHANGED = """
 &change time = 1 set = 'contact.restitution=0.8', 'box.gravity=0,-0.5' /
 &change time = 2 set = 'side.left.temperature=2', 'contact.wall_restitution=1' /
 &stop time = 3 /
-&output frames_every_time = 0.1 observables_every_time = 0.05 /
+&output frames_every_time = 0.1 observables_every_time = 0.05 frames_at = 0.35, 2.25 /
 """
 
 
@@ -79,6 +79,9 @@ def test_windows_between_changes_have_the_laws_then_in_force(simulated):
     assert sum(len(part) for part in parts) == len(whole)
     across = whole.window(0.5, 2.5)
     assert "changed" in across.nature
+    assert [part.parameter("stop", "time") for part in (*parts, across)] == [1, 1, 1, 2]
+    lists = [part.parameter("output", "frames_at") for part in parts]
+    assert lists[0] == [0.35] and lists[1] is None and lists[2] == [0.25]
     assert [change.time for change in across.changes] == [0.5, 0.5, 1.5, 1.5]
     for part in (*parts, across):
         for name in part.observables:

@@ -185,6 +185,7 @@ def laws_in(run: Run, start: float, end: float) -> dict[str, Any]:
     later = [one for one in run.changes[len(made) :] if one.time < end * (1 - ROUNDING)]
     parameters = changed(run.parameters, made)
     set_clocks(parameters, start)
+    set_schedule(parameters, start, end)
     set_corners(parameters, run, start)
     if later:
         lines = [f"{one.time - start:.17g} {one.name}={one.value}\n" for one in later]
@@ -205,6 +206,17 @@ def set_clocks(parameters: dict[str, Any], start: float) -> None:
             own["start_time"] = max(0.0, own["start_time"] - start)
         if "end_time" in own:
             own["end_time"] = own["end_time"] - start
+
+
+def set_schedule(parameters: dict[str, Any], start: float, end: float) -> None:
+    """Measure the end of the run and the listed times of samples from `start`."""
+    stop, output = (parameters.get(name, {}) for name in ("stop", "output"))
+    if "time" in stop:
+        stop["time"] = min(stop["time"], end) - start
+    for name in {"frames_at", "observables_at"} & output.keys():
+        times = np.atleast_1d(output.pop(name))
+        if len(inside := times[within(times, start, end)]):
+            output[name] = since(start, inside)
 
 
 def set_corners(parameters: dict[str, Any], run: Run, start: float) -> None:
