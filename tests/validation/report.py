@@ -11,19 +11,19 @@ from .case import Verdict
 
 HEAD = """# Physics validation
 
-How far can the numbers of the program be trusted? For researchers who rely on the results, this
-page lists all validation cases with their reference values, measured values and verdicts. A
-validation case runs the program on an input of its own and compares the result with an exact value,
-a derived formula or published numbers. All values, with their tolerances, are in the file
-`validation.json` beside this page. Both the page and `validation.json` are written by
-`python tests/validate.py --report docs/explanation/validation`.
+How far can the numbers of the program be trusted? This page lists all validation cases with their
+reference values, measured values and verdicts, for researchers who rely on the results. In each
+case the program runs an input of its own. The result is compared with an exact value, a derived
+formula or published numbers. The file `validation.json` beside this page contains all values with
+their tolerances. The command `python tests/validate.py --report docs/explanation/validation` writes
+both files.
 
-The *verdict* is the deviation from the reference divided by the tolerance: a value passes if its
+The *verdict* is the deviation from the reference, divided by the tolerance. A value passes if its
 verdict is at most 1. If the reference is a bound (≤ or ≥), the verdict is 0 if the bound is
 satisfied. The table has one row for each case. If a case has several values, the row shows the
-value that is closest to its tolerance. Values that must agree with the reference to rounding (1e-9
-or better) have no rows of their own. The row of a topic states how many values agree to rounding,
-and [the second table](#cases-that-agree-to-rounding) lists them.
+value that is closest to its tolerance. Some values must agree with the reference to rounding (1e-9
+or better). They have no rows of their own: the row of a topic states how many they are, and [the
+second table](#cases-that-agree-to-rounding) lists them.
 
 The column *source* names the origin of the reference:
 
@@ -71,12 +71,11 @@ TOPICS = {
 NOTES = """
 ## Notes on single cases
 
-The notes concern references that are approximate, differ from a publication, or hold only under
-certain conditions. A number in parentheses is the standard error of the last digit.
+Some references are approximate, differ from a publication, or hold only under certain conditions.
+These notes explain them. A number in parentheses is the standard error of the last digit.
 
-**P6-03, relaxation of a mixture.** The ratio K_heavy / K_light that was published for 2 collisions
-per disk, 1.39(1), is too low. The table lists other values of the ratio after 2 collisions per
-disk:
+**P6-03, relaxation of a mixture.** The published ratio K_heavy / K_light after 2 collisions per
+disk is 1.39(1). This value is too low, as other values of this ratio show:
 
 | method | ratio |
 |---|---|
@@ -86,8 +85,9 @@ disk:
 | Boltzmann equation | 1.455 |
 
 **P7-07, collision rates of a mixture.** The reference is calculated with approximate contact values
-of the pair distribution functions. For packing 0.1 the table lists the error of the contact values,
-to first order in the density, and the deviation of the measured collision rates from the reference.
+of the pair distribution functions. The table compares two numbers for packing fraction 0.1. The
+first is the error of the contact values, to first order in the density. The second is the deviation
+of the measured collision rates from the reference.
 
 | pair | error of the contact value (%) | measured deviation (%) |
 |---|---|---|
@@ -95,8 +95,9 @@ to first order in the density, and the deviation of the measured collision rates
 | 12 | +0.16 | +0.14(7) |
 | 22 | -0.29 | -0.45(6) |
 
-**P8-03, pressure of a dense fluid.** The table contains no case P8-03. Up to packing 0.70 the
-measured pressure agrees with the pressure of Li et al., 2022, within the errors of 0.03 to 0.2 %.
+**P8-03, pressure of a dense fluid.** The table contains no case P8-03. The measured pressure was
+compared with the results of Li et al. (2022). Up to packing fraction 0.70 both agree within the
+errors of 0.03 to 0.2 %.
 
 **P8-05, pressure of the crystal.** The formula for the reference pressure is accurate to 0.2 %.
 
@@ -110,27 +111,28 @@ the contact duration t_c:
 | 1 | 0.86 | 0.850 |
 | 0.5 | 0.62 | 0.612 |
 
-**P10-04, craters without the TC model.** Without the TC model an inelastic collapse occurs in all
-12 runs before the energy has fallen to a tenth of its initial value. In 7 of the 12 runs time no
-longer advances, and the run ends.
+**P10-04, craters without the TC model.** If the TC model is switched off, an inelastic collapse
+occurs in all 12 runs before the energy has fallen to a tenth of its initial value. In 7 of the 12
+runs time no longer advances, and the run ends.
 
 **P11-01, energy under gravity.** In the published table the disks of radius R start with their
-centres between the heights R and 8. In Ricochet a disk lies completely inside its starting region,
-so that the region must end at 8 + R.
+centres between the heights R and 8. In Ricochet a disk lies completely inside its starting region.
+The region must therefore end at 8 + R.
 
-**P11-10, time steps.** Time steps miss the fraction P(q) of the collisions, where q = g Δt / s, g
-is the relative speed, Δt the time step and s the sum of the radii. The argument of P is q and not q
-/ 2, because a collision is detected only while the disks approach each other. Overlapping disks
-approach each other along the first half of the path on which they overlap.
+**P11-10, time steps.** Let g be the relative speed of two disks, s the sum of their radii and Δt
+the time step. Runs with time steps miss the fraction P(q) of the collisions, where q = g Δt / s.
+The argument of P is q and not q / 2, because a collision is detected only while the disks approach
+each other. Overlapping disks approach each other along the first half of the path on which they
+overlap.
 
-**P12-06, diffusion in a Lorentz gas.** The coefficients -4/3, -0.8775 and 4.519 of the density
-expansion of D_0/D are quoted from memory, because the papers of van Leeuwen and Weijland could not
-be consulted. No published simulation was found. The limit of low density, D_0 = 3v/(16nR) from the
-Boltzmann equation, and the mean free time of case P12-05 are exact references. The table compares
-the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs of 10^6 events
-for each density). Up to n R^2 = 0.005, the first two terms agree with the measured values within
-the statistical errors. At n R^2 = 0.01 and above, the omitted terms are larger than the statistical
-errors.
+**P12-06, diffusion in a Lorentz gas.** The density expansion of D_0/D has the coefficients -4/3,
+-0.8775 and 4.519. They are quoted from memory, because the papers of van Leeuwen and Weijland could
+not be consulted. No published simulation was found. The limit of low density, D_0 = 3v/(16nR) from
+the Boltzmann equation, and the mean free time of case P12-05 are exact references. The table
+compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs of 10^6
+events for each density). Up to n R^2 = 0.005, the first two terms agree with the measured values
+within the statistical errors. At n R^2 = 0.01 and above, the omitted terms are larger than the
+statistical errors.
 
 | n R^2 | 0.0025 | 0.005 | 0.01 | 0.02 | 0.04 | 0.08 |
 |---|---|---|---|---|---|---|
@@ -139,24 +141,24 @@ errors.
 | expansion without its last term | 0.983 | 0.970 | 0.950 | 0.920 | 0.880 | 0.834 |
 
 **P12-09, Lyapunov exponent of the stadium.** The value 0.43 is quoted from memory, because the
-papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. The estimator of
-the exponent is confirmed by case P12-08, in which the exponent of an unstable path is known
-exactly. An independent program that simulates point particles (4000 paths of 2000 collisions)
-yielded the exponent 0.4292(5).
+papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. Two checks confirm
+it. In case P12-08 the same estimator finds the exponent of an unstable path, which is known
+exactly. An independent program for point particles (4000 paths of 2000 collisions) yielded the
+exponent 0.4292(5).
 
-**P15-09, sheared inelastic gas.** The error of the theory, which is linear in the stress, grows
-with the inelasticity. The cells of the table contain the reduced shear rate, -P_xy and P_yy, in
-this order.
+**P15-09, sheared inelastic gas.** The theory is linear in the stress. Its error therefore grows
+with the inelasticity. Each cell of the table contains three values: the reduced shear rate, -P_xy
+and P_yy.
 
 | restitution ξ | theory | measured |
 |---|---|---|
 | 0.95 | 0.2276, 0.2142, 0.9518 | 0.2275(6), 0.2168(6), 0.9494(6) |
 | 0.8 | 0.475, 0.379, 0.826 | 0.490(1), 0.386(1), 0.818(1) |
 
-**P15-13, Maxwell's demon.** The theoretical threshold, a floor velocity of 0.73, is derived for
-many dilute grains. The 120 disks of this case distribute evenly between the chambers if the floor
-velocity is above about 0.65. With 600 disks of a fifth of the diameter, most disks are still in one
-chamber at the floor velocity 0.65.
+**P15-13, Maxwell's demon.** The theory assumes many dilute grains. It predicts that the disks
+collect in one chamber if the floor velocity is below 0.73. The 120 disks of this case already
+distribute evenly between the chambers above about 0.65. With 600 disks of a fifth of the diameter,
+most disks are still in one chamber at 0.65.
 
 **P15-20, effusion.** The theoretical rate applies to an opening much narrower than the mean free
 path and than the chamber. For an opening 0.05 times as wide as the chamber, the measured rate is
@@ -164,9 +166,9 @@ path and than the chamber. For an opening 0.05 times as wide as the chamber, the
 measured rate is 5.4(6) % higher.
 
 **P15-21, discharge of a hopper.** The tolerance covers the values of k in the literature, which lie
-between 1 and 2. Since k and the exponent are strongly correlated, k was fitted with the exponent
-fixed, and the exponent was fitted with k fixed. Smooth grains do not obey Beverloo's law: for 2000
-smooth grains the fitted exponent is 1.29(3), with k = 1.3(2).
+between 1 and 2. Since k and the exponent are strongly correlated, each of the two was fitted with
+the other one fixed. Smooth grains do not obey Beverloo's law: a fit for 2000 smooth grains yields
+the exponent 1.29(3) and k = 1.3(2).
 """
 
 
@@ -276,37 +278,37 @@ The column *values* states the number of compared values.
 BARS = """
 ## Error bars and p-values
 
-Of 100 correct error bars, 68 contain the true value on average. The tables of this section, written
-by `python tests/coverage_tables.py`, show how many error bars of the scripts contain the true
-value. The systems and quantities were chosen before the first run, and the seeds of the tables were
-not used to improve the estimators. Some rows of the tables were measured again for the following
-reasons:
+Of 100 correct error bars, 68 contain the true value on average. The tables of this section show how
+many error bars of the scripts contain the true value. The script `python tests/coverage_tables.py`
+writes them. We chose the systems and quantities before the first run, and used other seeds to
+improve the estimators. Some rows were measured again for the following reasons:
 
-- The first tables showed that four errors were wrong: the errors of the flow velocity, of the
-  slopes under gravity, of the coefficients from Helfand moments and of the thermalisation time. The
-  rows of the four quantities were measured again with corrected estimators.
-- The rows of the Lyapunov exponent and of gases under gravity were repeated after the bias of the
-  exponent and the equilibration had been changed.
+- The first tables showed that the scripts calculated four errors wrongly: those of the flow
+  velocity, of the slopes under gravity, of the coefficients from Helfand moments and of the
+  thermalisation time. These rows were measured again with corrected estimators.
+- Later, the bias of the Lyapunov exponent and the equilibration under gravity were changed. The
+  rows concerned were then measured again.
 
-Curves of cooling gases as functions of time are compared at one fixed time. An error bar refers to a single run, or to a group of runs if the name of the system contains a number of runs. The table has
-the following columns:
+Curves of cooling gases as functions of time are compared at one fixed time. An error bar refers to
+a single run, unless the name of the system contains a number of runs; then it refers to a group of
+that many runs. The table has the following columns:
 
 - *bars*: number of runs or groups of runs.
 - *coverage*: percentage of the error bars that contain the true value. The true value is either
-  known exactly, or it is the mean over all bars. The expected coverage is 68 %, and 61 to 75 % are
-  allowed. For n error bars the standard deviation of the coverage is 47 / √n %.
-- *error / scatter*: mean error divided by the standard deviation of the measured values. Errors
-  with Student's t make the ratio larger than 1.
+  known exactly, or it is the mean over all bars. We expect a coverage of 68 % and allow 61 to 75 %.
+  For n error bars the standard deviation of the coverage is 47 / √n %.
+- *error / scatter*: mean error divided by the standard deviation of the measured values. The ratio
+  is larger than 1 if the errors contain the factor of Student's t.
 - *three*: coverage of means over three values, with errors calculated from the scatter of these
   values.
 
 In four rows about craters, the coverage is outside the allowed range. A projectile as light as a
-disk hits or displaces few disks in most beds and many disks in some beds, so that the distribution
-of the number of disks is skewed (skewness 2.2). A sample of four values from a skewed distribution
-often includes no large value; both the mean and the error of the sample are then too small. For
-means over more values, drawn at random from 240 craters, the coverage is better: 64 % for 16
-values, and 67 % for 64 values. The exponents are calculated from the numbers of disks. Because of
-the skewed distribution, the errors of the exponents are too small as well.
+disk hits or displaces few disks in most beds, but many disks in some beds. The distribution of the
+number of disks is therefore skewed (skewness 2.2). A sample of four values from such a distribution
+often includes no large value. Both the mean and the error of the sample are then too small. Means
+over more values, drawn at random from 240 craters, have a better coverage: 64 % for 16 values, and
+67 % for 64 values. The exponents are calculated from the numbers of disks, so their errors are too
+small as well.
 
 | system | quantity | bars | coverage | error / scatter | three |
 |---|---|---|---|---|---|
@@ -314,9 +316,9 @@ the skewed distribution, the errors of the exponents are too small as well.
 P_VALUES = """
 The second table lists p-values of `speeds.py` for runs to which the tested law applies. Of 100
 p-values, 5 should be below 0.05 and 32 below 0.32. *KS* stands for the Kolmogorov-Smirnov test of
-the speeds, and χ² for the χ² test. *Uniform* is the p-value of a Kolmogorov-Smirnov test that
-compares the distribution of the p-values in this row with the uniform distribution. The seeds of
-the mixtures begin at 20001, all other seeds at 1001.
+the speeds, and χ² for the χ² test. *Uniform* is the p-value of another Kolmogorov-Smirnov test.
+This test compares the p-values in the row with a uniform distribution. The seeds of the mixtures
+begin at 20001, all other seeds at 1001.
 
 | system | species | runs | KS: < .05 | < .32 | uniform | χ²: < .05 | < .32 | uniform |
 |---|---|---|---|---|---|---|---|---|
