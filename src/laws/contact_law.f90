@@ -32,8 +32,8 @@ module contact_law
 
   type(variable_t), parameter :: pair_restitution_row = &
     variable_t("contact", "pair_restitution", "real", 0, "optional", "1, 0.9, 0.9, 0.8", &
-      "Coefficients of restitution of each pair of species, given instead of contact.restitution. The values form a symmetric n " &
-      //"x n matrix for n species, listed as 1-1, 1-2, ..., 2-1, 2-2, ... in the order of the species in the input file.", &
+      "Symmetric n x n matrix of the coefficients of restitution of n species (1-1, 1-2, ..., 2-1, 2-2, ...), given instead of " &
+      //"contact.restitution. The species are in the order of the input file.", &
       unit_interval, &
       may_change=in_motion, otherwise="contact.restitution for all pairs")
 

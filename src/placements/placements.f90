@@ -36,9 +36,9 @@ module placements
       choices=words), &
     relaxed_rows, grid_rows, &
     variable_t("species", "file", "text", 1, "required", "'runs/gas.h5'", &
-      "Initial-configuration file, from which the positions and other properties of the disks are read. The file is a text file " &
-      //"with lines `x y [vx vy]` or with named columns (x y vx vy omega angle radius mass species), or the output file (.h5) of " &
-      //"another run, whose last frame is used. Count, mass and radius are read from the file unless the input contains them. " &
+      "Initial-configuration file: either a text file (lines `x y [vx vy]`, or named columns x y vx vy omega angle radius mass " &
+      //"species) or the output file (.h5) of another run, whose last frame is used. Count, mass and radius are read from the " &
+      //"file unless the input contains them. " &
       //"The path is relative to the folder in which the program is started.", &
       goes_with="placement "//with_file), &
     variable_t("species", "scale_positions", "logical", 1, "fallback", ".false.", &

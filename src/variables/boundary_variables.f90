@@ -59,8 +59,8 @@ module boundary_variables
       //"to to_angle. Disks pass through the gap between the ends of the arc if the gap is wide enough.", last_angle, "degrees", &
       excludes="side", otherwise="none; the obstacle is a whole circle"), &
     variable_t("obstacle", "file", "text", 1, "optional", "'scatterers.txt'", &
-      "File with many circles, given instead of centre and radius. The file is a text file with a line of column names (x y " &
-      //"radius) and one line per circle, or an HDF5 file (.h5) with the datasets centre and radius. Up to 1000000 circles form " &
+      "Text file (column names x y radius, then one line per circle) or HDF5 file (.h5, with the datasets centre and radius) " &
+      //"with many circles, given instead of the variables centre and radius. Up to 1000000 circles form " &
       //"a single obstacle, with one collision rule and one set of observables. With from_angle and to_angle, each circle is " &
       //"replaced by an arc between these two angles. The path is relative to the folder in which the program is started.", &
       excludes="centre radius", &
@@ -83,8 +83,8 @@ module boundary_variables
       unit="length", excludes="from to", otherwise="none; the wall is one straight " &
       //"segment"), &
     variable_t("wall", "file", "text", 1, "optional", "'walls.txt'", &
-      "File with many straight walls, given instead of from and to. The file is a text file with a line of column names (x1 y1 " &
-      //"x2 y2) and one line per wall, or an HDF5 file (.h5) with the datasets from and to. Up to 1000000 walls form a single " &
+      "Text file (column names x1 y1 x2 y2, then one line per wall) or HDF5 file (.h5, with the datasets from and to) with " &
+      //"many straight walls, given instead of the variables from and to. Up to 1000000 walls form a single " &
       //"obstacle, with one collision rule and one set of observables. The path is relative to the folder in which the program " &
       //"is started.", excludes="from to points", &
       otherwise="none; the group describes one wall or polyline")]
