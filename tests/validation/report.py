@@ -21,9 +21,9 @@ both files.
 The *verdict* is the deviation from the reference, divided by the tolerance. A value passes if its
 verdict is at most 1. If the reference is a bound (≤ or ≥), the verdict is 0 if the bound is
 satisfied. The table has one row for each case. If a case has several values, the row shows the
-value that is closest to its tolerance. Some values must agree with the reference to rounding (1e-9
-or better). They have no rows of their own: the row of a topic states how many they are, and [the
-second table](#cases-that-agree-to-rounding) lists them.
+value that is closest to its tolerance. Values that must agree with the reference to rounding (1e-9
+or better) are listed in [the second table](#cases-that-agree-to-rounding). In the first table, the
+row of each topic states the number of these values.
 
 The column *source* names the origin of the reference:
 
@@ -72,10 +72,11 @@ NOTES = """
 ## Notes on single cases
 
 Some references are approximate, differ from a publication, or hold only under certain conditions.
-These notes explain them. A number in parentheses is the standard error of the last digit.
+Such references are explained in the following notes. A number in parentheses is the standard error
+of the last digit.
 
 **P6-03, relaxation of a mixture.** The published ratio K_heavy / K_light after 2 collisions per
-disk is 1.39(1). This value is too low, as other values of this ratio show:
+disk is 1.39(1). The published value is too low, as other values of this ratio show:
 
 | method | ratio |
 |---|---|
@@ -86,8 +87,8 @@ disk is 1.39(1). This value is too low, as other values of this ratio show:
 
 **P7-07, collision rates of a mixture.** The reference is calculated with approximate contact values
 of the pair distribution functions. The table compares two numbers for packing fraction 0.1. The
-first is the error of the contact values, to first order in the density. The second is the deviation
-of the measured collision rates from the reference.
+first number is the error of the contact values, to first order in the density. The second number is
+the deviation of the measured collision rates from the reference.
 
 | pair | error of the contact value (%) | measured deviation (%) |
 |---|---|---|
@@ -126,13 +127,13 @@ each other. Overlapping disks approach each other along the first half of the pa
 overlap.
 
 **P12-06, diffusion in a Lorentz gas.** The density expansion of D_0/D has the coefficients -4/3,
--0.8775 and 4.519. They are quoted from memory, because the papers of van Leeuwen and Weijland could
-not be consulted. No published simulation was found. The limit of low density, D_0 = 3v/(16nR) from
-the Boltzmann equation, and the mean free time of case P12-05 are exact references. The table
-compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four runs of 10^6
-events for each density). Up to n R^2 = 0.005, the first two terms agree with the measured values
-within the statistical errors. At n R^2 = 0.01 and above, the omitted terms are larger than the
-statistical errors.
+-0.8775 and 4.519. These coefficients are quoted from memory, because the papers of van Leeuwen and
+Weijland could not be consulted. No published simulation was found. The limit of low density, D_0 =
+3v/(16nR) from the Boltzmann equation, and the mean free time of case P12-05 are exact references.
+The table compares the expansion with `runs/lorentz.sh`, which simulates 100 000 scatterers (four
+runs of 10^6 events for each density). Up to n R^2 = 0.005, the first two terms agree with the
+measured values within the statistical errors. At n R^2 = 0.01 and above, the omitted terms are
+larger than the statistical errors.
 
 | n R^2 | 0.0025 | 0.005 | 0.01 | 0.02 | 0.04 | 0.08 |
 |---|---|---|---|---|---|---|
@@ -141,22 +142,22 @@ statistical errors.
 | expansion without its last term | 0.983 | 0.970 | 0.950 | 0.920 | 0.880 | 0.834 |
 
 **P12-09, Lyapunov exponent of the stadium.** The value 0.43 is quoted from memory, because the
-papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. Two checks confirm
-it. In case P12-08 the same estimator finds the exponent of an unstable path, which is known
+papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. Two checks support
+this value. In case P12-08 the same estimator finds the exponent of an unstable path, which is known
 exactly. An independent program for point particles (4000 paths of 2000 collisions) yielded the
 exponent 0.4292(5).
 
-**P15-09, sheared inelastic gas.** The theory is linear in the stress. Its error therefore grows
-with the inelasticity. Each cell of the table contains three values: the reduced shear rate, -P_xy
-and P_yy.
+**P15-09, sheared inelastic gas.** The theory is linear in the stress. Therefore the error of the
+theory grows with the inelasticity. Each cell of the table contains three values: the reduced shear
+rate, -P_xy and P_yy.
 
 | restitution ξ | theory | measured |
 |---|---|---|
 | 0.95 | 0.2276, 0.2142, 0.9518 | 0.2275(6), 0.2168(6), 0.9494(6) |
 | 0.8 | 0.475, 0.379, 0.826 | 0.490(1), 0.386(1), 0.818(1) |
 
-**P15-13, Maxwell's demon.** The theory assumes many dilute grains. It predicts that the disks
-collect in one chamber if the floor velocity is below 0.73. The 120 disks of this case already
+**P15-13, Maxwell's demon.** The theory assumes many dilute grains. According to the theory, the
+disks collect in one chamber if the floor velocity is below 0.73. The 120 disks of this case already
 distribute evenly between the chambers above about 0.65. With 600 disks of a fifth of the diameter,
 most disks are still in one chamber at 0.65.
 
@@ -285,9 +286,10 @@ improve the estimators. Some rows were measured again for the following reasons:
 
 - The first tables showed that the scripts calculated four errors wrongly: those of the flow
   velocity, of the slopes under gravity, of the coefficients from Helfand moments and of the
-  thermalisation time. These rows were measured again with corrected estimators.
+  thermalisation time. The rows of these four quantities were measured again with corrected
+  estimators.
 - Later, the bias of the Lyapunov exponent and the equilibration under gravity were changed. The
-  rows concerned were then measured again.
+  rows of the Lyapunov exponent and of gases under gravity were then measured again.
 
 Curves of cooling gases as functions of time are compared at one fixed time. An error bar refers to
 a single run, unless the name of the system contains a number of runs; then it refers to a group of
