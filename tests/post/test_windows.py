@@ -334,6 +334,37 @@ def saved(box, path):
     return read_run(f"{path}.part")
 
 
+def test_a_new_motion_keeps_the_variables_that_it_shares_with_the_former_one(tmp_path):
+    stroke = "motion = 'constant_velocity' velocity = -0.1 start_time = 2 end_time = 3"
+    text = BOX.format(start="temperature = 1", end=1) + f" &side name = 'left' {stroke} / "
+    text += "&side name = 'top' motion = 'sine' amplitude = 0.001 period = 1 phase = 0.25 /"
+    with Simulation(text) as box:
+        before = saved(box, tmp_path / "before.h5").parameters
+        box.advance(time=0.5)
+        box.change({"side.left.motion": "constant_velocity", "side.left.velocity": 0.2})
+        box.change({"side.top.motion": "parabolic"})
+        after = saved(box, tmp_path / "after.h5").parameters
+    found = changed(before, changes_in(after["changes"]))["side"]
+    assert known(found["top"]) == known(after["side"]["top"])
+    after["side"]["left"].pop("position", None)
+    assert known(found["left"]) == known(after["side"]["left"])
+
+
+def test_the_area_in_the_pressure_is_that_of_the_program(simulated):
+    """An oscillating side counts at its present position if another side moves permanently."""
+    swing = "&side name = 'left' motion = 'sine' amplitude = 0.05 period = 0.3 /"
+    start = "temperature = 1 region = 0.1, 1.4, 0, 1"
+    side = f"{STROKE} position = 1.5 end_time = 0.6"
+    whole = simulated(BESIDE.format(side=side, start=start, more=swing, end=1.4))
+    for run in (whole, whole.window(0.2), whole.window(0.75)):
+        time, pressure = run.observable("virial_pressure")
+        area = run.accessible_area(time)
+        assert np.ptp(area) > 0 or run.sides[1]["motion"] == "still"
+        kinetic = run.n_disks * run.observable("all/kinetic_energy").value
+        virial, passed = run.observable("virial").value[1:], time[1:] - time[0]
+        np.testing.assert_allclose((pressure * area - kinetic)[1:], virial / (2 * passed))
+
+
 def in_both(found, expected):
     """Return whether the values agree; a value that a new rule needs may be listed only once."""
     found, expected = known(found), known(expected)

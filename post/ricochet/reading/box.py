@@ -135,7 +135,8 @@ class BoxResults(Results):
         """Return the area of the box without its obstacles, or the area of a round container.
 
         Walls and arcs have no area, even if they enclose a region. Oscillating sides are taken to
-        be at their mean positions, as in the pressure that the program writes.
+        be at their mean positions, unless another side moves permanently, as in the pressure that
+        the program writes.
 
         Parameters
         ----------
@@ -155,8 +156,8 @@ class BoxResults(Results):
         drifts = np.array([side.get("motion") in DRIFTING for side in self.sides])
         drifts[[*self.piston_positions]] = True
         lower, upper = self.corners_at(time)
-        lower = np.where(drifts[::2], lower, self.lower)
-        upper = np.where(drifts[1::2], upper, self.upper)
+        if not drifts.any():
+            lower, upper = (np.broadcast_to(end, lower.shape) for end in (self.lower, self.upper))
         area = np.prod(upper - lower, axis=-1)
         circles = [obstacle for obstacle in self.obstacles if not obstacle.is_arc]
         for circle in sorted(circles, key=lambda circle: not circle.inside):

@@ -11,18 +11,16 @@ import numpy as np
 from .nature import known, rows_of
 from .records import Change
 
-#: Variables of the motion of a side. A new motion drops those of the former one.
-OF_MOTION = {
-    "position",
-    "velocity",
-    "start_time",
-    "end_time",
-    "amplitude",
-    "period",
-    "phase",
-    "mass",
-    "force",
+#: Motions of a side with their variables. A new motion drops those that it does not have.
+OF_MOTIONS = {
+    "still": set[str](),
+    "constant_velocity": {"velocity", "start_time", "end_time"},
+    "sawtooth": {"velocity"},
+    "sine": {"amplitude", "period", "phase"},
+    "parabolic": {"amplitude", "period", "phase"},
+    "piston": {"mass", "force"},
 }
+OF_MOTION = {"position"}.union(*OF_MOTIONS.values())
 #: Defaults of the variables that may change, except those that follow other variables or are none.
 DEFAULTS: dict[str, dict[str, Any]] = {
     "box": {"gravity": np.zeros(2)},
@@ -122,10 +120,11 @@ def assign(parameters: dict[str, Any], change: Change) -> str:
         of_name = {"name": member[0], **DEFAULTS.get(group, {})}
         own = own.setdefault(names.get(member[0], member[0]), of_name)
     if name in ("motion", "kind"):
-        dropped = OF_MOTION if name == "motion" else DEFAULTS_OF["noise"] | DEFAULTS_OF["active"]
-        for former in dropped:
+        kinds = {**DEFAULTS_OF["noise"], **DEFAULTS_OF["active"]}
+        for former in OF_MOTION - OF_MOTIONS[value] if name == "motion" else kinds:
             own.pop(former, None)
-        own |= DEFAULTS_OF.get(value, {})
+        for kept, default in DEFAULTS_OF.get(value, {}).items():
+            own.setdefault(kept, default)
     if value is None:
         value = DEFAULTS_OF.get(own.get("motion", own.get("kind", "")), {}).get(name)
     if value is None:

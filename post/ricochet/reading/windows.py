@@ -77,20 +77,22 @@ class Window(Run):
             raise RunError(f"{self.path}: has no observables in {self._span}; {some}")
         own, found = since(self.start, time[inside]), value[inside]
         if name == "virial_pressure":
-            found = found + self._pressure_change(own)
+            found = self._virial_pressure(own)
         elif accumulates(name, value):
             found = found - found[0]
         return Series(own, found)
 
-    def _pressure_change(self, time: np.ndarray) -> np.ndarray:
-        """Return the change of `virial_pressure` if the virial is averaged from the start (T,)."""
-        samples, virial = self.whole.observable("virial")
-        virial = virial[within(samples, self.start, self.end)]
-        elapsed = time + self.start
-        before = np.divide(virial, 2 * elapsed, out=np.zeros_like(virial), where=elapsed > 0)
-        gain, passed = virial - virial[0], time - time[0]
-        since_start = np.divide(gain, 2 * passed, out=np.zeros_like(virial), where=passed > 0)
-        return (since_start - before) / self.accessible_area(time)
+    def _virial_pressure(self, time: np.ndarray) -> np.ndarray:
+        """Return the pressure (T,) with the virial averaged from the first sample."""
+        if self.shear_rate:  # relative to the flow
+            kinetic = self.observable("kinetic_tensor").value[:, [0, 3]].sum(axis=1) / 2
+        else:
+            inside = "inside" in self.observables
+            number = self.observable("inside").value if inside else self.n_disks
+            kinetic = number * self.observable("all/kinetic_energy").value
+        virial, passed = self.observable("virial").value, time - time[0]
+        mean = np.divide(virial, 2 * passed, out=np.zeros_like(virial), where=passed > 0)
+        return (kinetic + mean) / self.accessible_area(time)
 
     @cached_property
     def _event_log(self) -> EventLog:
