@@ -239,6 +239,17 @@ def test_windows_without_frames_are_left_out_and_rounding_errors_of_times_ignore
     assert len(late) == 2 and late.time[0] == 0 and late.restitution == 0.6
 
 
+def test_a_system_is_open_from_its_opening_until_all_disks_are_inside(simulated):
+    changes = [f"&change time = {k} set = 'side.top.open={k == 1}' /" for k in (1, 2)]
+    text = BOX.format(start="temperature = 1", end=3) + " ".join(changes)
+    closed, opened, later = simulated(text).windows()
+    assert ["open" in part.nature for part in (closed, opened, later)] == [False, True, True]
+    assert np.all(closed.present[:]) and not np.all(later.present[0])
+    assert package.analyse("speeds", closed).table[0]["N"] == 40
+    with pytest.raises(RunError, match="open system"):
+        package.analyse("speeds", later)
+
+
 def test_tables_and_warnings_name_the_window(simulated):
     whole = simulated(CHANGED)
     table = package.analyse("energy", whole.windows()).table

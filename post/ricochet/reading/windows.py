@@ -44,7 +44,8 @@ SUMS_OF_BOUNDARIES = ("/impulse", "/energy_to_disks")
 PRESENT_COUNTS = ("inside", "/particle_number")
 #: Counts of single disks that accumulate from frame to frame.
 COUNTS_OF_DISKS = ("event_count", "recycled")
-#: Traits that a run does not lose by a change of its laws.
+#: Traits that a run does not lose by a change of its laws. An open system remains open as long as
+#: some of its disks are outside.
 LASTING = {"open", "collapsed"}
 #: Provenance that describes the whole run.
 OF_WHOLE = {"wall_time", "collisions_per_second", "events_on_one_core"}
@@ -122,7 +123,10 @@ class Window(Run):
     @cached_property
     def nature(self) -> Nature:
         """Traits of the run in the window, which determine the applicable theories."""
-        return Nature(super().nature | self.whole.nature & LASTING)
+        lasting = self.whole.nature & LASTING
+        if self.present is not None and np.all(self.present[0]):
+            lasting -= {"open"}  # unless the laws in force open the system
+        return Nature(super().nature | lasting)
 
     @property
     def termination_note(self) -> str:
