@@ -96,9 +96,8 @@ the deviation of the measured collision rates from the reference.
 | 12 | +0.16 | +0.14(7) |
 | 22 | -0.29 | -0.45(6) |
 
-**P8-03, pressure of a dense fluid.** The table contains no case P8-03. The measured pressure was
-compared with the results of Li et al. (2022). Up to packing fraction 0.70 both agree within the
-errors of 0.03 to 0.2 %.
+**P8-03, pressure of a dense fluid.** The table contains no case P8-03. Up to packing fraction 0.70
+the measured pressure agrees with the results of Li et al. (2022). The errors are 0.03 to 0.2 %.
 
 **P8-05, pressure of the crystal.** The formula for the reference pressure is accurate to 0.2 %.
 
@@ -118,7 +117,7 @@ runs time no longer advances, and the run ends.
 
 **P11-01, energy under gravity.** In the published table the disks of radius R start with their
 centres between the heights R and 8. In Ricochet a disk lies completely inside its starting region.
-The region must therefore end at 8 + R.
+The starting region must therefore end at 8 + R.
 
 **P11-10, time steps.** Let g be the relative speed of two disks, s the sum of their radii and Δt
 the time step. Runs with time steps miss the fraction P(q) of the collisions, where q = g Δt / s.
@@ -143,9 +142,9 @@ larger than the statistical errors.
 
 **P12-09, Lyapunov exponent of the stadium.** The value 0.43 is quoted from memory, because the
 papers of Benettin and Strelcyn and of Dellago and Posch could not be consulted. Two checks support
-this value. In case P12-08 the same estimator finds the exponent of an unstable path, which is known
-exactly. An independent program for point particles (4000 paths of 2000 collisions) yielded the
-exponent 0.4292(5).
+this value. In case P12-08 the same estimator finds the exactly known exponent of an unstable path.
+An independent program for point particles (4000 paths of 2000 collisions) yielded the exponent
+0.4292(5).
 
 **P15-09, sheared inelastic gas.** The theory is linear in the stress. Therefore the error of the
 theory grows with the inelasticity. Each cell of the table contains three values: the reduced shear
@@ -158,8 +157,8 @@ rate, -P_xy and P_yy.
 
 **P15-13, Maxwell's demon.** The theory assumes many dilute grains. According to the theory, the
 disks collect in one chamber if the floor velocity is below 0.73. The 120 disks of this case already
-distribute evenly between the chambers above about 0.65. With 600 disks of a fifth of the diameter,
-most disks are still in one chamber at 0.65.
+distribute evenly between the chambers at floor velocities above about 0.65. If there are 600 disks
+with a fifth of the diameter, most disks are still in one chamber at the floor velocity 0.65.
 
 **P15-20, effusion.** The theoretical rate applies to an opening much narrower than the mean free
 path and than the chamber. For an opening 0.05 times as wide as the chamber, the measured rate is
@@ -280,9 +279,9 @@ BARS = """
 ## Error bars and p-values
 
 Of 100 correct error bars, 68 contain the true value on average. The tables of this section show how
-many error bars of the scripts contain the true value. The script `python tests/coverage_tables.py`
-writes them. We chose the systems and quantities before the first run, and used other seeds to
-improve the estimators. Some rows were measured again for the following reasons:
+many error bars of the scripts contain the true value. They are written by `python
+tests/coverage_tables.py`. We chose the systems and quantities before the first run, and used other
+seeds to improve the estimators. Some rows were measured again for the following reasons:
 
 - The first tables showed that the scripts calculated four errors wrongly: those of the flow
   velocity, of the slopes under gravity, of the coefficients from Helfand moments and of the
@@ -301,16 +300,16 @@ that many runs. The table has the following columns:
   For n error bars the standard deviation of the coverage is 47 / √n %.
 - *error / scatter*: mean error divided by the standard deviation of the measured values. The ratio
   is larger than 1 if the errors contain the factor of Student's t.
-- *three*: coverage of means over three values, with errors calculated from the scatter of these
-  values.
+- *three*: coverage of means over three values. The error of such a mean is calculated from the
+  scatter of the three values.
 
 In four rows about craters, the coverage is outside the allowed range. A projectile as light as a
 disk hits or displaces few disks in most beds, but many disks in some beds. The distribution of the
 number of disks is therefore skewed (skewness 2.2). A sample of four values from such a distribution
-often includes no large value. Both the mean and the error of the sample are then too small. Means
-over more values, drawn at random from 240 craters, have a better coverage: 64 % for 16 values, and
-67 % for 64 values. The exponents are calculated from the numbers of disks, so their errors are too
-small as well.
+often includes no large value. If a sample includes no large value, both its mean and its error are
+too small. Means over more values, drawn at random from 240 craters, have a better coverage: 64 %
+for 16 values, and 67 % for 64 values. The exponents are calculated from the numbers of disks, so
+their errors are too small as well.
 
 | system | quantity | bars | coverage | error / scatter | three |
 |---|---|---|---|---|---|
@@ -319,8 +318,8 @@ P_VALUES = """
 The second table lists p-values of `speeds.py` for runs to which the tested law applies. Of 100
 p-values, 5 should be below 0.05 and 32 below 0.32. *KS* stands for the Kolmogorov-Smirnov test of
 the speeds, and χ² for the χ² test. *Uniform* is the p-value of another Kolmogorov-Smirnov test.
-This test compares the p-values in the row with a uniform distribution. The seeds of the mixtures
-begin at 20001, all other seeds at 1001.
+This second test compares the p-values in the row with a uniform distribution. The seeds of the
+mixtures begin at 20001, all other seeds at 1001.
 
 | system | species | runs | KS: < .05 | < .32 | uniform | χ²: < .05 | < .32 | uniform |
 |---|---|---|---|---|---|---|---|---|
