@@ -1,5 +1,6 @@
 """Windows of a run: a part of it between two times is a run under the laws then in force."""
 
+import json
 import re
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 import ricochet as package
 from ricochet import RunError, Simulation, read_run, write_start
-from ricochet.reading.changed import changed, value_of
+from ricochet.reading.changed import DEFAULTS, DEFAULTS_OF, OF_MOTIONS, changed, value_of
 from ricochet.reading.paths import seen, turns_between
 from ricochet.reading.records import changes_in
 from ricochet.reading.windows import accumulates
@@ -311,6 +312,16 @@ SETTINGS = [
     "side.right.motion=constant_velocity side.right.velocity=0.01 side.right.end_time=50",
     "side.right.motion='still'",
     "side.top.surface_velocity=1",
+    "box.gravity=",
+    "contact.wall_rule=",
+    "contact.friction=0.3",
+    "contact.friction=",
+    "contact.tangential_restitution=",
+    "drive.kind= drive.interval= drive.strength= drive.species=",
+    "drive.keep_momentum=false",
+    "side.right.restitution=",
+    "side.right.rule='normal'",
+    "obstacle.post.temperature=",
 ]
 
 
@@ -323,7 +334,7 @@ def test_changed_parameters_are_those_of_the_simulation(seed, tmp_path):
     rough = "restitution = 0.9 tangential_restitution = 0.5"
     with Simulation(text.replace("restitution = 0.9", rough, 1) if seed % 2 else text) as box:
         before = saved(box, tmp_path / "before.h5").parameters
-        for k in range(6):
+        for k in range(8):
             box.advance(time=0.01 * (k + 1))
             chosen = str(rng.choice(SETTINGS)).replace(", ", ",").split(" ")
             try:
@@ -397,6 +408,19 @@ def rounded(values):
     """Return values of variables in a form that can be compared."""
     texts = {name: own for name, own in values.items() if isinstance(own, str)}
     return {name: np.round(own, 9) for name, own in values.items() if name not in texts} | texts
+
+
+def test_defaults_are_those_of_the_program(ricochet):
+    groups = json.loads(ricochet("--print-variables").stdout)
+    known_here = {name: value for own in DEFAULTS_OF.values() for name, value in own.items()}
+    for group, variables in groups.items():
+        own = DEFAULTS.get(group, {})
+        for name, variable in variables.items():
+            if variable["changeable"] and variable["default"] is not None:
+                found = own[name] if name in own else known_here[name]
+                assert np.ravel(found).tolist() == np.ravel(variable["default"]).tolist(), name
+    motions = groups["side"]["motion"]["choices"]
+    assert set(motions) == OF_MOTIONS.keys()
 
 
 def test_values_are_read_as_in_an_input():

@@ -175,7 +175,9 @@ def applies(name: str, boundary: Mapping[str, Any]) -> bool:
 def of_walls(contact: Mapping[str, Any], name: str, given: set[str]) -> Any:
     """Return the value of a variable of contacts for walls; None if it has none."""
     source = SOURCES.get(name, name)
-    return contact.get(name if f"contact.{name}" in given else source)
+    value = contact.get(name if f"contact.{name}" in given else source)
+    smooth = DEFAULTS["contact"].get(source) if source == "tangential_restitution" else None
+    return value if value != smooth else None
 
 
 def value_of(text: str) -> Any:
