@@ -77,12 +77,12 @@ HEAD = """\
 The pages below describe every variable of an input file. [input/README](../../input/README.md)
 explains the format of the file and shows how to describe a system. The file
 [input/reference.nml](../../input/reference.nml) contains all variables with their defaults. The
-command `ricochet --explain VARIABLE` prints the description of one variable, and `--explain WORD`
-searches names, choices and descriptions.
+command `ricochet --explain VARIABLE` prints the description of one variable. To search names,
+choices and descriptions for a word, use `ricochet --explain WORD`.
 
-An input file consists of groups `&name ... /` with lines `variable = value`. Only values that
-differ from the default are needed. The input file determines the units of length, time and mass
-([units](../explanation/glossary.md#units)). On the command line `--set` replaces a value:
+An input file consists of groups `&name ... /` with lines `variable = value`. It needs to contain
+only values that differ from the default. The input file determines the units of length, time and
+mass ([units](../explanation/glossary.md#units)). On the command line `--set` replaces a value:
 
 | option | replaces |
 |---|---|
@@ -90,14 +90,14 @@ differ from the default are needed. The input file determines the units of lengt
 | `--set species.projectile.mass=50` | a variable of a species, an obstacle or a wall, by its name |
 | `--set 'box.gravity(2)=-5'` | one element of a vector, by its number |
 
-For each variable a table lists the allowed values with their unit, the default, and an example if
-there is no default. The table of a variable can also contain the following rows:
+Each variable has a table, which lists the allowed values with their unit and the default. If there
+is no default, the table contains an example. It can also contain the following rows:
 
-- *applies with*: the choice of another variable without which this variable has no effect;
+- *applies with*: this variable has no effect unless another variable has the value stated here;
 - *excludes*: variables that cannot be combined with this variable;
-- *may change*: on `--resume` (variables without an effect on the trajectory), or while a
-  simulation runs (by `&change`, in Python and on the laboratory page). If this row is missing, the
-  variable is fixed during a run.
+- *may change*: when the variable may change. Variables without an effect on the trajectory may
+  change *on `--resume`*. *While a simulation runs* means by `&change`, in Python, or on the laboratory
+  page. If this row is missing, the variable is fixed during a run.
 
 `docs/input_page.py` generates the pages on variables from the table in the program.
 

@@ -32,9 +32,9 @@ Programs in C, or in any language that can call C, can use the engine as a libra
 INPUTS_HEAD = """\
 # Inputs
 
-All files in `input/` are listed here. An input file is ready to run, and comments in the file
-explain the settings. The pictures show the simulations at one time, and `make lab` shows the
-simulations in motion. `docs/reference_pages.py` generates this page.
+This page lists all files in `input/`. Each input file is ready to run. Comments in the file explain
+the settings. The pictures show the simulations at one time; `make lab` shows them in motion.
+`docs/reference_pages.py` generates this page.
 
 """
 
