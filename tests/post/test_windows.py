@@ -275,6 +275,8 @@ def test_haffs_law_begins_with_the_first_sample(gas):
             np.testing.assert_allclose(found, expected, rtol=1e-9)
     with pytest.raises(RunError, match="has one sample"):
         package.analyse("haff", run.window(0.42, 0.51))
+    with pytest.raises(RunError, match="no free paths"):
+        package.analyse("rates", run.window(0.5, 0.5001)).figure()
     with pytest.raises(RunError, match="a part of the run"):
         package.analyse("cost", run.window(0.5))
 

@@ -208,6 +208,8 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     kicked = any("thermostatted" in run.nature for run in runs)
     paths = None if kicked else mean_and_density(runs, skip)
     means = over_all(runs, skip, warnings) if settled else {}
+    if not means and not paths:
+        raise RunError(f"{runs[0].path}: has no free paths from t = {start:.4g} on; run longer")
     pressures = pressures_in_time(runs) if settled else {}
     curves = {(f"pressure_{way}(t)",): curve for way, curve in pressures.items()}
     if paths:
