@@ -96,8 +96,8 @@ is no default, the table contains an example. It can also contain the following 
 - *applies with*: this variable has no effect unless another variable has the value stated here;
 - *excludes*: variables that cannot be combined with this variable;
 - *may change*: when the variable may change. Variables without an effect on the trajectory may
-  change *on `--resume`*. *While a simulation runs* means by `&change`, in Python, or on the laboratory
-  page. If this row is missing, the variable is fixed during a run.
+  change *on `--resume`*. *While a simulation runs* means by `&change`, in Python, or on the
+  laboratory page. If this row is missing, the variable is fixed during a run.
 
 `docs/input_page.py` generates the pages on variables from the table in the program.
 
