@@ -65,8 +65,8 @@ as an open symbol.
 """,
     "energy": """\
 With every method the total energy is constant to a relative error of {energy_change}. The table
-compares the measured fraction of missed collisions with the calculated fraction. It was measured in
-32 pairs of runs of 520 s.
+compares the measured fraction of missed collisions with the calculated fraction. The measurement
+used 32 pairs of runs of 520 s.
 
 | dt | missed (%) | formula (%) |
 |---|---|---|
