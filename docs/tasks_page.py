@@ -50,7 +50,7 @@ walls of the exam. With smooth walls it is {left_normal}.
   bed it grows with the radius, because a small projectile reaches the floor and loses its energy
   there. All beds in the figure have 2000 grains. Open points are small projectiles that reach the
   floor of such a bed.
-- *Restitution.* As ξ approaches 1 the crater grows to the whole bed.
+- *Restitution.* As ξ approaches 1, the crater grows until it includes the whole bed.
 
 | grains in the bed | hit with radius 2 | radius 5 | radius 10 |
 |---|---|---|---|
