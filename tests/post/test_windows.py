@@ -281,6 +281,15 @@ def test_haffs_law_begins_with_the_first_sample(gas):
         package.analyse("cost", run.window(0.5))
 
 
+def test_the_law_of_heights_needs_two_samples(simulated):
+    run = simulated(
+        "&box gravity = 0, -2 / &species count = 20 packing_fraction = 0.05 temperature = 1 / "
+        "&stop time = 1 / &output frames_every_time = 0.1 observables_every_time = 0.1 /"
+    )
+    with pytest.raises(RunError, match="needs two samples"):
+        package.analyse("gravity", run.window(0.5, 0.55)).figure()
+
+
 def test_windows_of_one_run_have_a_structure_of_their_own(gas):
     run = gas(length=100)
     first, second = run.window(0, 0.5), run.window(0.5)

@@ -300,7 +300,10 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     if not frames:
         raise RunError(f"{run.path}: needs frames in equilibrium")
     species = [samples(run, kind, frames) for kind in thermodynamics.kinds_of_disks(run)]
-    rows = table(run, species, thermodynamics.temperature_after(run, start))
+    kt = thermodynamics.temperature_after(run, start)
+    if not np.isfinite(kt.mean):
+        raise RunError(f"{run.path}: needs two samples of the observables in equilibrium")
+    rows = table(run, species, kt)
     warnings: list[str] = []
     for kind, s, row in zip(run.by_species, species, rows, strict=True):
         mean = correlated_mean(s.height.mean(axis=1))
