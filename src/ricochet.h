@@ -156,8 +156,8 @@ int ricochet_next_events(ricochet *, int most, double records[][6]);
 
 /* --- Only in libricochet_files.so --- */
 
-/* Saves a simulation as the unfinished output of a run stopped at the present time. The command
-   `ricochet INPUT -o OUT.h5 --resume` continues this run. The saved file contains only the samples of the initial state
+/* Saves a simulation in the format of a run that was interrupted at the present time. The command
+   `ricochet INPUT -o OUT.h5 --resume` continues the simulation. The saved file contains only the samples of the initial state
    or, after a change, only the samples of the present state.
    path:   path of the finished output, OUT.h5; the saved file is OUT.h5.part
    force:  nonzero to replace an existing output

@@ -11,9 +11,9 @@ module tangential_law
   type(variable_t), parameter :: tangential_rows(*) = [ &
     variable_t("contact", "tangential_restitution", "real", 1, "default", "-1", &
       "Coefficient of tangential restitution of disk-disk collisions: -1 for smooth surfaces, 0 if collisions stop the slip, 1 " &
-      //"if they reverse it. Above -1 the disks are rough and rotate. Values between -1 and 1 dissipate energy even in " &
-      //"collisions that the TC model (contact_time) makes elastic. With such values, grains resting in a dense bed collapse or " &
-      //"collide millions of times; use -1 or 1 for these grains.", &
+      //"if they reverse it. With values above -1 the disks are rough and rotate. Values between -1 and 1 dissipate energy " &
+      //"even in collisions that the TC model (contact_time) makes elastic. With such values, grains resting in a dense " &
+      //"bed collapse or collide millions of times; use -1 or 1 for these grains.", &
       tangential, may_change=in_motion), &
     variable_t("contact", "friction", "real", 1, "optional", "0.3", &
       "Coulomb friction coefficient of disk-disk collisions: upper limit of the ratio of tangential to normal impulse. Friction " &
@@ -26,9 +26,9 @@ module tangential_law
   !> Variables of all walls in `&contact`.
   type(variable_t), parameter :: wall_tangential_rows(*) = [ &
     variable_t("contact", "wall_tangential_restitution", "real", 1, "optional", "0.5", &
-      "Coefficient of tangential restitution of collisions with sides and obstacles, except those with a value of their own " &
-      //"(tangential_restitution in &side, &obstacle or &wall): -1 for smooth surfaces, 0 if collisions stop the slip, 1 if " &
-      //"they reverse it.", tangential, goes_with="wall_rule normal", &
+      "Coefficient of tangential restitution of collisions with sides and obstacles: -1 for smooth surfaces, 0 if collisions " &
+      //"stop the slip, 1 if they reverse it. A tangential_restitution in &side, &obstacle or &wall overrides this value.", &
+      tangential, goes_with="wall_rule normal", &
       may_change=in_motion, otherwise="contact.tangential_restitution"), &
     variable_t("contact", "wall_friction", "real", 1, "optional", "0.3", &
       "Coulomb friction coefficient of collisions with sides and obstacles, except those with a value of their own (friction in " &
@@ -40,7 +40,7 @@ module tangential_law
   type(variable_t), parameter :: own_tangential_rows(*) = [ &
     variable_t("", "tangential_restitution", "real", 1, "optional", "0.5", &
       "Coefficient of tangential restitution of this boundary: -1 for smooth surfaces, 0 if collisions stop the slip, 1 if " &
-      //"they reverse it. Above -1 the boundary is rough, and the disks rotate.", tangential, goes_with="rule normal", &
+      //"they reverse it. With values above -1 the boundary is rough, and the disks rotate.", tangential, goes_with="rule normal", &
       may_change=in_motion, otherwise="contact.wall_tangential_restitution"), &
     variable_t("", "friction", "real", 1, "optional", "0.3", &
       "Coulomb friction coefficient of this boundary: upper limit of the ratio of tangential to normal impulse. Friction needs a " &

@@ -26,7 +26,8 @@ module choices
       //"per event."), &
     choice_t("queue", "calendar", "Events are stored in a calendar queue, with a cost per event that does not depend on N."), &
     choice_t("queue", "heap", "Events are stored in a heap with four children per node, with a cost of O(log N) per event."), &
-    choice_t("boundary", "wall", "Disks bounce off both sides along this axis. The collision rule is set for all sides in " &
+    choice_t("boundary", "wall", "Disks bounce off the two sides that bound the box in this direction. The collision rule " &
+      //"is set for all sides in " &
       //"&contact, and for single sides in &side."), &
     choice_t("boundary", "periodic", "Opposite sides are identified (periodic boundary conditions). Along this axis the box " &
       //"must be longer than two disk diameters, and box.gravity must be 0."), &
