@@ -22,7 +22,16 @@ from ricochet.figures.drawing import (
     note_on_size,
     plt,
 )
-from ricochet.figures.sheet import CM, LINE, STACKED, text_style, title_letters, width_of, wrap
+from ricochet.figures.sheet import (
+    CM,
+    LINE,
+    STACKED,
+    text_style,
+    title_letters,
+    title_size,
+    width_of,
+    wrap,
+)
 from ricochet.reports.options import chosen_disks, chosen_frames
 from ricochet.script import add_width, command_line, launch, report
 
@@ -137,7 +146,7 @@ def draw(args: argparse.Namespace) -> tuple[plt.Figure, list[dict[str, Any]]]:
             row = {"run": run.path.name, "disk": disk + 1, "frames": len(frames)}
             rows.append(row | dict(zip(names, places, strict=True)))
     longest = max(axes.get_title("left").count("\n") + 1 for axes in panels.flat)
-    line = plt.rcParams["axes.titlesize"] * LINE / 72  # [inches]
+    line = title_size() * LINE / 72  # [inches]
     more = line * max(0, longest - 3) + (GAP if args.width else 0)
     figure.set_figheight(below * (height + more))
     return figure, rows

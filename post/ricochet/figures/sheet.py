@@ -9,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
 
@@ -231,9 +232,14 @@ def width_of(text: float | str | None) -> tuple[float, bool]:
     return width, False
 
 
+def title_size() -> float:
+    """Return the size of titles [points]."""
+    return FontProperties(size=plt.rcParams["axes.titlesize"]).get_size_in_points()
+
+
 def title_letters(width: float) -> float:
     """Return the number of letters of a title that fit into a width [inches]."""
-    return width / CM * LETTERS * SMALLEST / plt.rcParams["axes.titlesize"]
+    return width / CM * LETTERS * SMALLEST / title_size()
 
 
 def text_style(width: float | str | None) -> dict[str, Any]:
