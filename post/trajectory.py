@@ -12,26 +12,8 @@ import argparse
 from typing import Any
 
 from ricochet import Run, RunError
-from ricochet.figures.drawing import (
-    COLOURS,
-    aspect_of,
-    caption,
-    disk_collection,
-    draw_box,
-    drawn_diameters,
-    note_on_size,
-    plt,
-)
-from ricochet.figures.sheet import (
-    CM,
-    LINE,
-    STACKED,
-    text_style,
-    title_letters,
-    title_size,
-    width_of,
-    wrap,
-)
+from ricochet.figures import drawing, sheet
+from ricochet.figures.drawing import plt
 from ricochet.reports.options import chosen_disks, chosen_frames
 from ricochet.script import add_width, command_line, launch, report
 
@@ -90,27 +72,27 @@ def has_every_event(run: Run, frames: list[int]) -> bool:
 
 def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) -> None:
     """Draw the paths of the chosen disks, and all disks in the last frame."""
-    draw_box(axes, run, run.time[frames[-1]])
+    drawing.draw_box(axes, run, run.time[frames[-1]])
     others = np.full(run.n_disks, "0.85")
     others[disks] = "none"
-    sizes = drawn_diameters(axes, run)
-    disk_collection(axes, run, run.position[frames[-1]], facecolors=others, zorder=0.8)
+    sizes = drawing.drawn_diameters(axes, run)
+    drawing.disk_collection(axes, run, run.position[frames[-1]], facecolors=others, zorder=0.8)
     for order, (disk, path) in enumerate(zip(disks, paths_of(run, disks, frames), strict=True)):
-        colour = COLOURS[order % len(COLOURS)]
+        colour = drawing.COLOURS[order % len(drawing.COLOURS)]
         alpha = float(np.clip(60 / len(path), 0.25, 1)) ** 0.5
         axes.plot(*path.T, color=colour, lw=0.8, alpha=alpha, zorder=1)
         axes.plot(*path[0], marker="x", color=colour, zorder=4)
         axes.add_patch(Circle(path[-1], sizes[disk] / 2, color=colour, lw=0, zorder=0.9))
     lines = "" if has_every_event(run, frames) else ",  lines join frames"
-    letters = title_letters(axes.figure.get_figwidth() / axes.get_gridspec().ncols - MARGIN)
+    letters = sheet.title_letters(axes.figure.get_figwidth() / axes.get_gridspec().ncols - MARGIN)
     titles = (
         f"{run.parameter('run', 'title') or run.path.stem}",
-        f"{caption([run])}{lines}",
+        f"{drawing.caption([run])}{lines}",
         f"t = {run.time[frames[0]]:.4g} (crosses) to {run.time[frames[-1]]:.4g} (disks)"
-        f"{note_on_size(axes, run)}",
+        f"{drawing.note_on_size(axes, run)}",
     )
     axes.set_title(
-        "\n".join(line for title in titles for line in wrap(title, letters)),
+        "\n".join(line for title in titles for line in sheet.wrap(title, letters)),
         parse_math=False,
         pad=18,  # above the labels of the walls
     )
@@ -120,7 +102,7 @@ def main() -> None:
     parser = command_line(__doc__, "trajectory.png", frames=None, count=None, disks=None)
     add_width(parser, "13cm for each run")
     args = parser.parse_args()
-    with plt.style.context(text_style(args.width)):
+    with plt.style.context(sheet.text_style(args.width)):
         figure, rows = draw(args)
     report(args, figure, rows)
 
@@ -128,10 +110,10 @@ def main() -> None:
 def draw(args: argparse.Namespace) -> tuple[plt.Figure, list[dict[str, Any]]]:
     """Draw the paths of all runs side by side; return also the rows of the table."""
     size, rows = len(args.runs), []
-    tallest = min(max(map(aspect_of, args.runs)), 2.0)
-    paper = width_of(args.width)[0] if args.width else 0.0
-    columns = 1 if 0 < paper < STACKED else size
-    width, below = (paper * CM / columns if paper else 5.2), size // columns
+    tallest = min(max(map(drawing.aspect_of, args.runs)), 2.0)
+    paper = sheet.width_of(args.width)[0] if args.width else 0.0
+    columns = 1 if 0 < paper < sheet.STACKED else size
+    width, below = (paper * sheet.CM / columns if paper else 5.2), size // columns
     height = (width - MARGIN) * tallest + 1.15  # the title has three lines
     shape = {"squeeze": False, "figsize": (width * columns, height * below)}
     figure, panels = plt.subplots(below, columns, **shape)
@@ -146,7 +128,7 @@ def draw(args: argparse.Namespace) -> tuple[plt.Figure, list[dict[str, Any]]]:
             row = {"run": run.path.name, "disk": disk + 1, "frames": len(frames)}
             rows.append(row | dict(zip(names, places, strict=True)))
     longest = max(axes.get_title("left").count("\n") + 1 for axes in panels.flat)
-    line = title_size() * LINE / 72  # [inches]
+    line = sheet.title_size() * sheet.LINE / 72  # [inches]
     more = line * max(0, longest - 3) + (GAP if args.width else 0)
     figure.set_figheight(below * (height + more))
     return figure, rows
