@@ -4,8 +4,8 @@
 
 Runs that differ only in their seed form a point, and points that differ in one parameter form a
 curve.  The fits are size = A x^p with equal weights, where x is the parameter or, for the
-restitution xi, 1 - xi^2.  For light projectiles the numbers of disks have skewed distributions, so
-that errors of means over few runs are too small.
+restitution xi, 1 - xi^2.  For light projectiles the numbers of disks hit and displaced have skewed
+distributions; with few runs, the errors of their means are then underestimated.
 
 panels (two for each parameter: mass, speed, radius, restitution)
   PARAMETER_numbers    disks hit and displaced
@@ -18,8 +18,8 @@ first table (a row for each point)
   in_fit                          1: the point is included in the fit
 
 second table (a row for each fit)
-  exponent     exponent p, with its error by the jackknife over beds with common seeds, or from
-               the scatter of the points
+  exponent     exponent p; its error comes from a jackknife over the seeds if all points use the
+               same seeds, otherwise from the fit
   chi2/dof     chi squared over the number of degrees of freedom
 
 refuses

@@ -12,19 +12,22 @@
 
 panels
   curves              a line for each run; dashed: theory, see below
-  picture1 ...        the last frame of each input, or the first and the last frame of one input
+  picture1 ...        one input: its first and last frame; several inputs: the last frame of each
+                      (at most three)
 
 table (a row for each input and species)
-  late                mean over the second half of the run, with its error over runs or time
+  late                mean over the second half of the run (share: of the fuller half of the box)
+  late_error          from the fluctuations in time or, if this is larger, the scatter of the runs
   kT_x, kT_y          components of the temperature [energy]
   deviation           standard deviation of the width; theory_deviation: predicted value
   enthalpy_change, momentum_change    largest relative changes of the conserved quantities
   theory, ratio       predicted value of `late`, and late / theory
 
 theories (for equal disks)
-  balance of white noise and dissipation (van Noije and Ernst 1998), dilute gas in two chambers
-  (after Eggers 1999); for elastic disks also the adiabat of a slow side, the width at constant
-  enthalpy
+  temperature         white noise balanced by dissipation (van Noije and Ernst 1998)
+  temperature         elastic disks: adiabat of a slowly moving side
+  share               dilute gas in two chambers (after Eggers 1999)
+  width               elastic disks: mean width at constant enthalpy
 
 refuses
   runs with one frame, --show width without a piston, --show viscosity without shear

@@ -13,9 +13,12 @@ panels
 
 table (a row for each N and species)
   runs ... independent    numbers of runs, frames, speeds and independent speeds
-  kT, kT_x, kT_y          temperature and its components [energy]; kT_first, kT_last: in one frame
-  mean_u, kurtosis, a2    <u>; <u^4>, 2 for Maxwell's law; <v^4> / (2 <v^2>^2) - 1
-  law, KS_D ... chi2_p    law of the tests, Kolmogorov-Smirnov and chi-square tests with p-values
+  kT, kT_x, kT_y          temperature and its components [energy]
+  kT_first, kT_last       temperature in the first and in the last frame used
+  mean_u, kurtosis, a2    <u>; <u^4> (Maxwell: 2); <v^4> / (2 <v^2>^2) - 1 (Maxwell: 0)
+  law                     law of the tests: Maxwell, or fixed_energy (N disks share a fixed energy)
+  KS_D, KS_p              Kolmogorov-Smirnov test: distance and p-value
+  chi2/dof, chi2_p        chi-square test, with its p-value
 
 refuses
   fewer than three disks, disks at rest, sliding surfaces, runs that differ in kind

@@ -3,10 +3,12 @@
     python post/transport.py runs/driven/transport_*/*.h5 -o transport.png --csv transport.csv
 
 Runs with equal packing fraction are combined.  They need the Helfand moments (output.helfand) with
-about four samples per mean free time and, for D, frames at equal intervals.  A viscosity or the
-conductivity is half the slope of the mean square change of a Helfand moment against the lag.  D is
-half of the integral of <v(0) v(s)>.  The fixed total energy of N disks reduces the coefficients by
-a fraction of 2/N to 6/N (docs/explanation/laws.md).
+about four samples per mean free time and, for D, frames at equal intervals.
+
+Viscosities and conductivity: plot the mean square change of a Helfand moment against the lag; half
+the slope is A kT times the viscosity, or A (kT)^2 times the conductivity (A: area of the box).  D
+is half of the integral of <v(0) v(s)>.  With fixed energy and zero total momentum, the viscosities
+and the conductivity of N disks are too small by a fraction of 2/N to 6/N.
 
 panels
   viscosity, conductivity, bulk_viscosity, D    coefficient divided by Enskog's, against the lag
@@ -20,10 +22,11 @@ table (a row for each packing fraction and coefficient)
   ratio      value / enskog
 
 refuses
-  walls, inelastic disks, driving, runs without Helfand moments or shorter than eight collisions
+  walls, inelastic disks, driving, runs without Helfand moments, or with fewer than eight collisions
+  per disk in equilibrium
 
 see also
-  correlations.py (D of species), driven.py --show viscosity (shear)
+  correlations.py (D of species), driven.py --show viscosity (shear), docs/explanation/laws.md
 """
 
 from ricochet.script import launch, run_analysis
