@@ -259,8 +259,8 @@ contains
   end subroutine append
 
   !> Prefetches the data for predicting the next events of several disks, in three stages: the
-  !> records of the disks, their cells, and the disks in these cells. In each stage, the collision
-  !> partner of a disk is prefetched one call later than the disk.
+  !> records of the disks, their cells, and the disks in these cells. The record and the cells of a
+  !> disk's collision partner are fetched one stage later than the disk's own.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_contents_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)

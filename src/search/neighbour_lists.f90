@@ -30,7 +30,7 @@ module neighbour_lists
   private
   public :: neighbour_lists_t
 
-  !> Values in place of the number of entries of a list.
+  !> Special values of the entry count: no list made yet; list too short for all neighbours.
   integer(int32), parameter :: unlisted = -2, incomplete = -1
   !> Number of array elements copied from every list, even if the list is shorter. Copying a fixed
   !> number needs no branch.
@@ -41,10 +41,9 @@ module neighbour_lists
   !> entries.
   integer(int32), parameter :: most_listed = image_unit/4
 
-  !> Minimum width of the cells in the second, narrow grid, in units of the radius plus margin of a
-  !> disk of mean radius. A disk fits into a narrow cell if its radius plus margin is at most half
-  !> the width of the cell. Since the value is above 2, the narrow cells are wide enough for all
-  !> disks up to the mean radius and for some larger disks.
+  !> Minimum width of a narrow cell, divided by (mean radius + margin). A disk fits if its own
+  !> radius plus margin is at most half the cell width. With 2 the mean disk would just fit; a
+  !> larger value admits somewhat larger disks.
   real(real64), parameter :: narrow_width = 2.2_real64
 
   !> The region around a disk in which its list is valid. When the centre of the disk leaves it, the
@@ -54,11 +53,11 @@ module neighbour_lists
     type(line_t) :: column(0:1), row(0:1)
   end type neighbourhood_t
 
+  !> Minimum mean number of disks in 3 x 3 cells for which lists save time in a dilute system.
   real(real64), parameter, public :: candidates_that_pay = 30.0_real64
 
   type :: neighbour_lists_t
     logical :: used = .false.
-    !> Minimum mean number of disks in 3 x 3 cells for which lists save time in a dilute system.
     real(real64) :: least_candidates = candidates_that_pay
     !> Capacity of the list of a small disk; larger disks have more neighbours.
     integer(int32) :: capacity = 16
@@ -105,10 +104,10 @@ module neighbour_lists
 
 contains
 
-  !> Allocates the neighbour lists if they are expected to save time. With lists, the prediction
-  !> after a collision tests fewer disks. However, the lists must be renewed, and this is more
-  !> frequent at lower densities. `least_candidates` and the width of the neighbourhoods were
-  !> optimised for polydisperse disks.
+  !> Allocates the neighbour lists if they are expected to save time. With lists, a prediction after
+  !> a collision tests fewer disks, but the lists must be renewed, and the lower the density, the
+  !> more often. `least_candidates` and the width of the neighbourhoods were optimised for
+  !> polydisperse disks.
   subroutine prepare(self, disk, tag, lower, edges, layout)
     class(neighbour_lists_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -243,8 +242,9 @@ contains
       nearer = line
       do up = 0, 1
         place = x(axis) + (2*up - 1)*margin
+        ! A moving side does not bound a neighbourhood.
         if ((2*up - 1)*(line(up)%place + line(up)%inset*radius - place) <= 0 &
-          .and. .not. (line(up)%struck .and. is_wall(line(up)%code))) cycle    ! moving sides are no limit
+          .and. .not. (line(up)%struck .and. is_wall(line(up)%code))) cycle
         nearer(up)%place = place
         nearer(up)%inset = 0
         nearer(up)%code = looks_again - up
@@ -289,7 +289,7 @@ contains
     real(real32) :: own(4)                         ! extent of disk i [length]
 
     own = self%extent(:, i)
-    self%extent(4, i) = -(2*own(4) + 4*own(3))     ! excludes disk i itself from the candidates
+    self%extent(4, i) = -(2*own(4) + 4*own(3))     ! makes the distance test reject disk i itself
     n = 0
     if (layout%at_seam(cell)) then
       call find_cells(cells, layout, cell, around, image)
@@ -315,8 +315,8 @@ contains
     self%extent(4, i) = own(4)
   contains
 
-    !> Adds the disks in the linked list of a crowded cell to the neighbour list of disk i. The
-    !> first of these disks is left out, because it was already added from the last slot.
+    !> Adds the disks in the linked list of a crowded cell to the candidates. The first disk of the
+    !> linked list is skipped: it also occupies the last slot and was added with the slots.
     subroutine add_chain(c, image)
       integer(int32), intent(in) :: c, image
       integer(int32) :: j
@@ -532,8 +532,8 @@ contains
     n = max(self%entry(self%first(i)), 0)
   end function n_entries
 
-  !> Neighbour k, counted from 0, in the list of disk i, and the periodic image in which disk i can
-  !> touch it.
+  !> Disk j (index counted from 0) in entry k = 1, 2, ... of the list of disk i, and the periodic
+  !> image in which disk i can touch it.
   pure subroutine neighbour(self, i, k, j, image)
     class(neighbour_lists_t), intent(in) :: self
     integer(int32), intent(in) :: i, k
@@ -547,8 +547,8 @@ contains
   end subroutine neighbour
 
   !> Prefetches the data for predicting the next events of several disks, in three stages: the
-  !> records of the disks, their neighbour lists, and the disks in these lists. In each stage, the
-  !> collision partner of a disk is prefetched one call later than the disk.
+  !> records of the disks, their neighbour lists, and the disks in these lists. The record and the
+  !> list of a disk's collision partner are fetched one stage later than the disk's own.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(neighbour_lists_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
