@@ -1,6 +1,6 @@
-!> Tests whether disks are at rest, or whether events no longer advance the time, as in an inelastic
-!> collapse. The results depend only on the state of the simulation, not on the search, the queue or
-!> the number of threads.
+!> Tests whether all disks are at rest, or whether time has stopped although events go on, as in an
+!> inelastic collapse. The results depend only on the state of the simulation, not on the search,
+!> the queue or the number of threads.
 module rest
   use box_sides, only: bounds, next_side
   use encounters, only: is_passage
@@ -85,7 +85,7 @@ contains
     end do
   end function is_at_rest
 
-  !> Whether all disks are at rest, and nothing can set them in motion: no gravity, shear, moving
+  !> True if all disks are at rest, and nothing can set them in motion: no gravity, shear, moving
   !> side, driving, source or scheduled change.
   pure function stays_at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
@@ -96,13 +96,12 @@ contains
     if (yes) yes = is_at_rest(sim)
   end function stays_at_rest
 
-  !> The disk that rests on a side while other disks move, and this side; 0 if there is none. If
-  !> several disks rest on sides, the result is the disk with the lowest id. The last event of this
-  !> disk and its next bounce on a dissipative side are both within `negligible_time` of the present
-  !> time. Its bounces are lower than the spacing of its coordinates. They are therefore not
-  !> resolved: they converge, and time stops advancing. The next bounce is computed here. The stored
-  !> event of the disk cannot be used, because it depends on the search, and the parallel engine may
-  !> not have predicted any.
+  !> Finds a disk that rests on a side while other disks move. Its last event and its next bounce on
+  !> a dissipative side are both within `negligible_time` of now. Such bounces are lower than the
+  !> spacing of the coordinates, so they cannot be resolved: they converge, and time stops
+  !> advancing. Returns the disk with the lowest id and its side, or 0. The next bounce is computed
+  !> here. The stored event of the disk cannot be used, because it depends on the search, and the
+  !> parallel engine may not have predicted any.
   pure function disk_on_side(sim) result(found)
     type(simulation_t), intent(in) :: sim
     integer(int32) :: found(2)                       !! index of the disk, and code of the side

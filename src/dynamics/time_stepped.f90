@@ -74,8 +74,8 @@ contains
     if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
   end function pause_at
 
-  !> Prepares the dynamics for continuing after velocities have been changed. Only the test for rest
-  !> is reset; Verlet lists do not depend on velocities.
+  !> Prepares the dynamics for continuing after velocities have been changed. Disks that were at
+  !> rest may move again. The Verlet lists stay valid, because they do not depend on velocities.
   subroutine renew(self, sim, changed)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -83,8 +83,9 @@ contains
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
 
-  !> Updates the predicted events after changes of disks. The serial engine predicts the events of
-  !> these disks anew. Domains cannot do this and are loaded again.
+  !> Updates the predicted events after changes of disks. The serial engine predicts only the events
+  !> of these disks anew. The domains cannot be updated in part, so all disks are loaded into them
+  !> again.
   subroutine renew(self, sim, changed)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
