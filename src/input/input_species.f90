@@ -179,14 +179,15 @@ contains
     type(species_settings_t), intent(inout) :: species(:)
     type(problem_list_t), intent(inout) :: problems
     type(group_fields_t) :: fields
-    integer :: k, giver                                 ! giver: first species with a given value, or 0
+    integer :: k
+    integer :: first_given               ! index of the first species whose group sets the variable, or 0
 
-    giver = findloc([(groups(k)%given(common_variable), k=1, size(groups))], .true., dim=1)
-    do k = 1, merge(size(groups), 0, giver > 0)
-      associate (shared => groups(giver)%integer_of(common_variable, 0_int64))
+    first_given = findloc([(groups(k)%given(common_variable), k=1, size(groups))], .true., dim=1)
+    do k = 1, merge(size(groups), 0, first_given > 0)
+      associate (shared => groups(first_given)%integer_of(common_variable, 0_int64))
         if (groups(k)%given(common_variable)) then
           if (groups(k)%integer_of(common_variable, 0_int64) /= shared) call groups(k)%complain(common_variable, &
-            "must be the same for all species; """//trim(groups(giver)%instance)//""" has "//written(shared), problems)
+            "must be the same for all species; """//trim(groups(first_given)%instance)//""" has "//written(shared), problems)
         else if (species(k)%placement%moves_all_disks()) then
           call groups(k)%put_text(common_variable, written(shared))
           fields%group = groups(k)

@@ -348,7 +348,8 @@ contains
       //" "//what, problems)
   end subroutine report_disk
 
-  !> Predicate of a message about a disk that overlaps another disk or an obstacle.
+  !> Second half of the message about a disk that overlaps another disk or an obstacle, beginning
+  !> with the verb: 'overlaps disk 3 of "gas"'.
   function conflict(packing, species, blocker) result(text)
     type(packing_t), intent(in) :: packing
     type(species_settings_t), intent(in) :: species(:)
