@@ -20,8 +20,9 @@ module contact_law
       "Contact duration t_c of the TC model, which prevents inelastic collapse: a collision is elastic if one of its partners " &
       //"collided less than t_c ago. With t_c = 0 the model is switched off. Choose t_c far below the mean time between " &
       //"collisions and, for grains of diameter d resting under gravity g, below sqrt(d/g). The model does not prevent the " &
-      //"collapse of resting grains with friction or with a tangential restitution between -1 and 1, because such grains " &
-      //"dissipate energy even in these elastic collisions. The TC model is not available with stop.at_rest.", &
+      //"collapse of resting grains with friction or with a tangential restitution between -1 and 1, because their tangential " &
+      //"motion still loses energy in collisions that the model makes elastic along the normal. The TC model is not available " &
+      //"with stop.at_rest.", &
       not_negative, "time", may_change=in_motion)
 
   type(variable_t), parameter :: inertia_row = &
@@ -96,7 +97,8 @@ contains
 
   !> Impulse on disk i, as a multiple q of the separation vector dx = x_j - x_i. The velocity v_i
   !> changes by q dx/m_i, and v_j changes by -q dx/m_j. The actual distance of the disks is used
-  !> instead of the sum of their radii. Energy is then conserved up to rounding errors.
+  !> instead of the sum of their radii, so that elastic collisions conserve energy up to rounding
+  !> errors.
   pure function pair_impulse(b, distance2, mass_i, mass_j, restitution) result(q)
     real(real64), intent(in) :: b                    !! dx . dv [length**2/time]
     real(real64), intent(in) :: distance2            !! dx . dx [length**2]
