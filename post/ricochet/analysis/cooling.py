@@ -233,8 +233,8 @@ def flow_notes(groups: Sequence[tuple[str, Sequence[Run]]]) -> list[str]:
 def first_rate(run: Run) -> float:
     """Return the initial collision rate w0 [1/time] of smooth disks cooling in a periodic box.
 
-    For equal disks w0 is predicted by the equation of state; for mixtures it is measured. Refused
-    is raised if Haff's law does not apply.
+    For equal disks w0 is predicted by the equation of state; for mixtures it is measured. Raise
+    `Refused` if Haff's law does not apply.
     """
     law = "Haff's law is for smooth disks that only cool, in a periodic box"
     allow(run, law, *SMOOTH)
@@ -262,8 +262,8 @@ def counted_rate(run: Run) -> float:
 def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return w0 t, collisions per disk and K / K(0) at each sample, all of shape (T,).
 
-    Refused is raised if Haff's law does not apply to the run. In a window of a run, the first
-    sample may follow after its start.
+    Raise `Refused` if Haff's law does not apply to the run. In a window of a run, the first sample
+    may follow after the start of the window.
     """
     time, tau = run.collisions_per_disk
     if len(time) < 2:
@@ -354,7 +354,7 @@ def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray
 def rough_law(run: Run) -> tuple[float, float, float]:
     """Return normal and tangential restitution and I / (m r^2) of rough disks.
 
-    Refused is raised if the theory of cooling rough disks does not apply to the run.
+    Raise `Refused` if the theory of cooling rough disks does not apply to the run.
     """
     law = "the laws are for equal rough disks that cool in a periodic box, without contact.friction"
     allow(run, law, "inelastic", "rough", "rotating")

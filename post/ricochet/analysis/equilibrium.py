@@ -266,7 +266,7 @@ def motion_notes(runs: Sequence[Run]) -> list[str]:
 def unforced(source: Run | Simulation) -> np.ndarray:
     """Return a mask (2,) of the axes along which only noise changes the total momentum.
 
-    Tangential forces of walls (`ALONG_WALLS`) are neglected. Refused is raised if noise accelerates
+    Tangential forces of walls (`ALONG_WALLS`) are neglected. Raise `Refused` if noise accelerates
     the centre of mass while friction at walls may decelerate it.
     """
     box, nature = source.parameters.get("box", {}), source.nature

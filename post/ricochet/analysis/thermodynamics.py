@@ -282,7 +282,7 @@ def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
 def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     """Estimate Z = P A / (N kT) from the force of equal disks on four walls.
 
-    A is the area that disk centres can reach. Refused is raised if the run does not reach
+    A is the area that disk centres can reach. Raise `Refused` if the run does not reach
     equilibrium.
     """
     s = steps(run, skip)
@@ -327,7 +327,7 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     """Return "pressure_virial", and the pressure on each wall as "pressure_left" and so on.
 
-    Pressures are in energy/length^2. Refused is raised if the run does not reach equilibrium.
+    Pressures are in energy/length^2. Raise `Refused` if the run does not reach equilibrium.
     """
     s = steps(run, skip)
     inside = correlated_mean(run.n_disks * s.kt * s.time + s.virial / 2, s.time)
