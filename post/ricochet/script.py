@@ -7,6 +7,7 @@ import argparse
 import re
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,8 +16,6 @@ from pathlib import Path
 from typing import NoReturn
 
 import matplotlib
-from tqdm import tqdm
-
 from .figures.drawing import STYLE, plt, save, warn
 from .reading.files import counted, did_you_mean
 from .reading.nature import Refused, stays_in_box
@@ -216,16 +215,21 @@ def run_analysis(name: str, doc: str) -> None:
 
 @contextmanager
 def timer(name: str) -> Iterator[None]:
-    """Show on a terminal how long an analysis has been running, once it exceeds `PATIENCE`."""
-    ended = threading.Event()
+    """Show on a terminal how long an analysis has been running, once it exceeds `PATIENCE`.
+
+    The line is not a progress bar of tqdm: an interrupt while another bar is drawn leaves the lock
+    that all bars share acquired, and this thread would wait for it for ever.
+    """
+    ended, begin = threading.Event(), time.monotonic()
 
     def show() -> None:
-        if ended.wait(PATIENCE):
-            return
-        with tqdm(desc=name, bar_format="{desc}: {elapsed}", leave=False) as line:
-            line.start_t -= PATIENCE
-            while not ended.wait(1.0):
-                line.refresh()
+        text, patience = "", PATIENCE
+        while not ended.wait(patience):
+            minutes, seconds = divmod(int(time.monotonic() - begin), 60)
+            text, patience = f"{name}: {minutes:02d}:{seconds:02d}", 1.0
+            print(f"\r{text}", end="", file=sys.stderr, flush=True)
+        if text:
+            print(f"\r{' ' * len(text)}\r", end="", file=sys.stderr, flush=True)
 
     thread = threading.Thread(target=show, daemon=True)
     if sys.stderr.isatty():

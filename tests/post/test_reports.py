@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from tqdm import tqdm
 
 import ricochet
 from ricochet import RunError, script
@@ -60,12 +61,14 @@ def test_other_scripts_stay_short():
 
 
 def test_a_terminal_shows_that_an_analysis_takes_long(monkeypatch):
+    """An interrupted progress bar of tqdm leaves the lock of all bars acquired."""
     terminal = io.StringIO()
     terminal.isatty = lambda: True
     monkeypatch.setattr(script, "PATIENCE", 0.0)
     monkeypatch.setattr(sys, "stderr", terminal)
-    with script.timer("speeds"):
+    with tqdm.get_lock(), script.timer("speeds"):
         wait_for(lambda: "speeds: 00:0" in terminal.getvalue())
+    assert terminal.getvalue().endswith("\r")
 
 
 def test_a_script_prints_the_table_of_the_function(tmp_path, capsys, runs):
