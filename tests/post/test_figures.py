@@ -30,7 +30,9 @@ def figures(monkeypatch):
     """Collect the figures that scripts would write."""
     found = []
     monkeypatch.setattr(script, "save", lambda figure, *_: found.append(figure))
-    return found
+    yield found
+    for figure in found:
+        plt.close(figure)
 
 
 # --- cooling ---
