@@ -65,6 +65,8 @@ if TYPE_CHECKING:  # for type checkers only, because `__getattr__` loads these m
     from .analysis import structure as structure
     from .analysis import thermodynamics as thermodynamics
     from .analysis import transport as transport
+    from .exchange import bridges as bridges
+    from .exchange import foreign as foreign
     from .figures import drawing as drawing
     from .figures import film as film
     from .figures import film_data as film_data
@@ -82,11 +84,9 @@ if TYPE_CHECKING:  # for type checkers only, because `__getattr__` loads these m
     from .predictions import walls as walls
     from .reading import arrays as arrays
     from .reading import box as box
-    from .exchange import bridges as bridges
     from .reading import changed as changed
     from .reading import contacts as contacts
     from .reading import files as files
-    from .exchange import foreign as foreign
     from .reading import frames as frames
     from .reading import nature as nature
     from .reading import paths as paths

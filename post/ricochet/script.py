@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import matplotlib
+
 from .figures.drawing import STYLE, plt, save, warn
 from .reading.files import counted, did_you_mean
 from .reading.nature import Refused, stays_in_box
@@ -24,8 +25,8 @@ from .reading.units import UNNAMED
 from .reports import analysis
 from .reports.options import (
     RENAMED,
+    TIMES,
     shared,
-    time_window,
     unit_names,
 )
 from .reports.registry import distinct
@@ -201,9 +202,7 @@ def run_analysis(name: str, doc: str) -> None:
     parser.set_defaults(paired=own.unfinished)
     parser.add_argument("--panel", metavar="NAME", help="panel to draw alone [all panels]")
     add_width(parser, "16cm")
-    part = "only the times from START up to END, as a run of the laws then in force; 20: has no END"
-    parser.add_argument("--times", type=time_window, metavar="START:END", help=part)
-    for option in own.options:
+    for option in (TIMES, *own.options):
         option.add_to(parser)
     args = parser.parse_args()
     with timer(name):

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..reading.arrays import Index, chosen
 from ..reading.files import RunError, counted, destination, optional_package
-from .foreign import DAMAGE, check_counts, check_index, check_values
 from ..reading.nature import Refused
 from ..reading.reader import Run
+from .foreign import DAMAGE, check_counts, check_index, check_values
 
 if TYPE_CHECKING:
     import MDAnalysis

@@ -128,6 +128,13 @@ def shared(name: str, default: Any = None) -> Option:
     return Option(name, meaning, default, convert, symbol)
 
 
+#: Window of time to which all analyses can be restricted.
+TIMES = Option(
+    "times",
+    "only the times from START up to END, as a run of the laws then in force; 20: has no END",
+    convert=time_window,
+    symbol="START:END",
+)
 #: Options of several scripts: conversion, symbol of the value, and help text, by name.
 OPTIONS: dict[str, tuple[Callable[[str], Any], str, str]] = {
     "frames": (frame_list, "LIST", "frames to use, such as 0,10,-1 or 100:200 or ::5"),

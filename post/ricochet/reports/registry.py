@@ -15,12 +15,9 @@ from ..reading.reader import Run, read_run
 from ..reading.units import units_of
 from . import analyses
 from .groups import Group, Grouping, differences, together
-from .options import Option, time_window
+from .options import TIMES, Option
 from .result import Result
 from .tables import once
-
-
-TIMES = Option("times", "window of time", convert=time_window)
 
 
 def accept(run: Run) -> None:
