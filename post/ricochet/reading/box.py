@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .changed import value_of
 from .frames import Series
 from .records import Change, Obstacle, changes_in
 from .results import SIDES, Results
@@ -14,6 +15,7 @@ DRIFTING = (
     "constant_velocity",
     "piston",
 )  # motions of a side that change the area of the box for good
+OSCILLATING = ("sine", "parabolic")  # motions about a fixed mean position
 MOVED = ("motion", "velocity", "start_time", "end_time", "amplitude", "period", "phase")
 
 
@@ -92,8 +94,8 @@ class BoxResults(Results):
         found = np.tile([bool(side.get("open", False)) for side in self.sides], (*now.shape, 1))
         for k, side in enumerate(SIDES):
             for change in self.changes:
-                if change.name == f"side.{side}.open":
-                    opens = change.value.strip(" .").lower().startswith("t")
+                if change.parts == ["side", side, "open"]:
+                    opens = bool(value_of(change.value))
                     found[..., k] = np.where(now >= change.time, opens, found[..., k])
         return found
 
@@ -112,7 +114,7 @@ class BoxResults(Results):
     @property
     def _free_sides(self) -> list[int]:
         """Indices in `sides` of the pistons, and of the sides whose motion is changed."""
-        names = (change.name.lower().split(".") for change in self.changes)
+        names = (change.parts for change in self.changes)
         new = {name[1] for name in names if name[0] == "side" and name[-1] in MOVED}
         return [
             k
@@ -179,7 +181,7 @@ def outmost(side: Mapping[str, Any]) -> float:
     """Return the largest outward displacement (see `displaced`) of a side during the run."""
     if side.get("motion") == "constant_velocity":
         return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
-    return float(side["amplitude"]) if side.get("motion") in ("sine", "parabolic") else 0.0
+    return float(side["amplitude"]) if side.get("motion") in OSCILLATING else 0.0
 
 
 def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:

@@ -61,8 +61,8 @@ OF_WALLS = {  # the rule determines whether the last two apply
 }
 #: Variables among them that apply only to boundaries with the rule 'normal'.
 OF_NORMAL_RULE = {"tangential_restitution", "friction"}
-#: The last parts of the names of laws, which drop the variables of the former law.
-LAWS = (".motion", ".kind")
+#: Variables that select a law, and thus drop the variables of the former law.
+LAWS = ("motion", "kind")
 #: Groups that are stored as columns.
 COLUMNS = ("obstacle", "wall")
 
@@ -74,8 +74,8 @@ def changed(parameters: Mapping[str, Any], changes: Iterable[Change]) -> dict[st
     given = set(given_in(str(found.get("input", "")), str(found.get("overrides", ""))))
     for _, together in groupby(changes, key=lambda change: change.time):
         # A new law comes first, because it drops variables that the same change may set.
-        for change in sorted(together, key=lambda one: not one.name.lower().endswith(LAWS)):
-            name = assign(found, change)
+        for change in sorted(together, key=lambda one: one.parts[-1] not in LAWS):
+            name = assign(found, change.parts, value_of(change.value))
             given = given | {name} if change.value.strip() else given - {name}
         derive(found, given)
     return found
@@ -103,11 +103,11 @@ def given_in(text: str, overrides: str) -> Iterator[str]:
             yield re.sub(r"\(.*", "", where).strip()
 
 
-def assign(parameters: dict[str, Any], change: Change) -> str:
-    """Assign the new value of a variable or, for an empty one, its default; return its name."""
-    group, *member, last = change.name.lower().split(".")
+def assign(parameters: dict[str, Any], parts: list[str], value: Any) -> str:
+    """Assign the new value of a variable or, for None, its default; return its name."""
+    group, *member, last = parts
     name, _, element = last.partition("(")
-    name, value = name.strip(), value_of(change.value)
+    name = name.strip()
     if value is None:
         value = copy.copy(DEFAULTS.get(group, {}).get(name))
     full = ".".join([group, *member, name])
@@ -119,7 +119,7 @@ def assign(parameters: dict[str, Any], change: Change) -> str:
         names = {one.lower(): one for one in own}
         of_name = {"name": member[0], **DEFAULTS.get(group, {})}
         own = own.setdefault(names.get(member[0], member[0]), of_name)
-    if name in ("motion", "kind"):
+    if name in LAWS:
         kinds = {**DEFAULTS_OF["noise"], **DEFAULTS_OF["active"]}
         for former in OF_MOTION - OF_MOTIONS[value] if name == "motion" else kinds:
             own.pop(former, None)
@@ -157,11 +157,12 @@ def derive(parameters: dict[str, Any], given: set[str]) -> None:
         own = parameters.get(group, {})
         each = rows_of(own) if group in COLUMNS else [*own.values()]
         for boundary in each:
-            full = f"{group}.{boundary['name'].lower()}.{name}"
+            parts = [group, boundary["name"].lower(), name]
+            full = ".".join(parts)
             short = f"{group}.{name}" if len(each) == 1 else full
             if not {full, short} & given:
                 value = of_walls(contact, source, given) if applies(name, boundary) else None
-                assign(parameters, Change(0.0, full, "" if value is None else str(value)))
+                assign(parameters, parts, value)
 
 
 def applies(name: str, boundary: Mapping[str, Any]) -> bool:

@@ -382,15 +382,14 @@ class Run(PressureResults):
         >>> len(run.windows())  # without changes, the whole run
         1
         """
-        times = sorted({0.0, *(change.time for change in self.changes), np.inf})
         from .windows import within
 
-        spans = [
-            (start, end)
+        times = sorted({0.0, *(change.time for change in self.changes), np.inf})
+        return [
+            self.window(start, end)
             for start, end in pairwise(times)
             if len(self.time[within(self.time, start, end)])
         ]
-        return [self.window(start, end) for start, end in spans]
 
     @property
     def restitution(self) -> float:

@@ -147,6 +147,11 @@ class Change(NamedTuple):
     name: str
     value: str
 
+    @property
+    def parts(self) -> list[str]:
+        """Group, name of its member if there are several, and variable, in lower case."""
+        return self.name.lower().split(".")
+
 
 def changes_in(text: str) -> list[Change]:
     """Return the changes listed in a text with lines TIME GROUP.VARIABLE=VALUE."""

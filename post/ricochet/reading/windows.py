@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .box import displaced
+from .box import OSCILLATING, displaced
 from .changed import changed
 from .files import RunError
 from .frames import Frames, Series
@@ -202,7 +202,7 @@ def laws_in(run: Run, start: float, end: float) -> dict[str, Any]:
 def set_clocks(parameters: dict[str, Any], start: float) -> None:
     """Measure all times in the laws of sides and sources from `start`."""
     for own in [*parameters.get("side", {}).values(), *parameters.get("source", {}).values()]:
-        if own.get("motion") in ("sine", "parabolic"):
+        if own.get("motion") in OSCILLATING:
             own["phase"] = (own.get("phase", 0.0) + start / own["period"]) % 1
         if own.get("motion") == "constant_velocity" and own["end_time"] <= start:
             own["motion"] = "still"
@@ -230,7 +230,7 @@ def set_corners(parameters: dict[str, Any], run: Run, start: float) -> None:
     sides = [parameters.get("side", {}).get(name, {}) for name in SIDES]
     places = np.stack(run.corners_at(start), axis=1).ravel()
     for k, side in enumerate(sides):
-        if side.get("motion") in ("sine", "parabolic"):
+        if side.get("motion") in OSCILLATING:
             places[k] = (run.lower, run.upper)[k % 2][k // 2]
         elif k in run.piston_positions and side.get("motion") != "piston":
             places[k] = place_at_start(run, k, side, start, places[k])
