@@ -106,9 +106,12 @@ class Bench:
         flags, passed = f"-x -n {self.jobs} --dist worksteal", []
         while found := self.run(" ".join([PYTEST, flags, words, *passed])):
             names = [shlex.quote(name) for name in found if "::" in name]
-            again = " ".join([PYTEST, "-m ''", *names])
-            if not names or (self.run(again) and not self.fails_without_fault(again)):
+            if not names:
                 return found
+            for name in names:
+                again = f"{PYTEST} -m '' {name}"
+                if self.run(again) and not self.fails_without_fault(again):
+                    return [name]
             passed += [f"--deselect {name}" for name in names]
         return []
 
@@ -122,16 +125,16 @@ class Bench:
         return (self.units(units) if units else []) or (self.pytest(" ".join(runs)) if runs else [])
 
     def users(self, file: str) -> Iterator[str]:
-        """Yield the tests that are named like a module, or import it or a part of it.
+        """Yield the tests that are named like a module, import it or a part of it, or run a script.
 
         The examples in docstrings are tests of all modules.
         """
         parts = re.findall(r"^(?:class|def) ([a-zA-Z]\w*)", (self.tree / file).read_text(), re.M)
         word = re.compile(rf"\b({'|'.join([Path(file).stem, *parts])})\b")
         for path in sorted((self.tree / "tests").glob("*/test_*.py")):
-            imported = IMPORTS.findall(path.read_text())
-            name = path.stem.removeprefix("test_")
-            if name == "docstrings" or word.search("\n".join([name, *imported])):
+            text, name = path.read_text(), path.stem.removeprefix("test_")
+            runs = name == "docstrings" or f'run_script("{Path(file).stem}"' in text
+            if runs or word.search("\n".join([name, *IMPORTS.findall(text)])):
                 yield str(path.relative_to(self.tree))
 
     def rest(self, file: str) -> list[str]:
