@@ -12,8 +12,7 @@
 
 panels
   curves              a line for each run; dashed: theory, see below
-  picture1 ...        one input: its first and last frame; several inputs: the last frame of each
-                      (at most three)
+  picture1 ...        first and last frame of one input, last frames of two or three inputs
 
 table (a row for each input and species)
   late                mean over the second half of the run (share: of the fuller half of the box)

@@ -44,6 +44,14 @@ PATIENCE = 5.0  # computing time after which a terminal shows that an analysis i
 # --- options ---
 
 
+class HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """Format of help texts, with each option beside its description."""
+
+    def __init__(self, prog: str) -> None:
+        """Widen the column of the options, to 26 characters."""
+        super().__init__(prog, max_help_position=26)
+
+
 class Parser(argparse.ArgumentParser):
     """Command-line parser that suggests a similar option for an unknown one."""
 
@@ -122,8 +130,13 @@ def command_line(
     `OPTIONS`, and its value is the default. The default may be None, or a text that describes what
     the script does without the option.
     """
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
+    given = "RUN.h5" if one else "RUN.h5 [RUN.h5 ...]"
+    parser = Parser(
+        usage=f"%(prog)s [options] {given}",
+        description=doc,
+        formatter_class=HelpFormatter,
+        allow_abbrev=False,
+    )
     parser.set_defaults(title=doc.splitlines()[0], repeated=repeated, open_systems=open_systems)
     parser.set_defaults(paired=False, notes=[])
     some = {"nargs": 1 if one else "+", "help": f"file{'s' * (not one)} written by ricochet"}
@@ -137,7 +150,7 @@ def command_line(
             metavar="FILE",
             help="file to which the numbers are written as a table",
         )
-    names = "names of units for the axes, such as length=cm,time=s,mass=g [reduced units]"
+    names = "names of units: length=cm,time=s,mass=g [reduced]"
     parser.add_argument("--units", type=unit_names, default=UNNAMED, metavar="NAMES", help=names)
     for name, default in defaults.items():
         shared(name, default).add_to(parser)
@@ -146,7 +159,7 @@ def command_line(
 
 def add_width(parser: argparse.ArgumentParser, default: str) -> None:
     """Add the option --width, whose default is described in words, to the parser of a script."""
-    meaning = f"width of the figure, such as 8.5cm, or slide for a projector [{default}]"
+    meaning = f"width of the figure: 8.5cm, or slide [{default}]"
     parser.add_argument("--width", metavar="WIDTH", help=meaning)
 
 

@@ -203,9 +203,7 @@ def test_the_oscillation_of_a_bed_is_told_apart_from_heat(tmp_path, rng, capsys)
 def test_the_help_states_which_frames_are_used(capsys):
     assert run_script("fields", "--help") == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert (
-        "are left out [the first half of each run]" in said and "no observable drifts" not in said
-    )
+    assert "equilibration (collisions per disk) [first half]" in said and "no drift" not in said
 
 
 @pytest.mark.parametrize(

@@ -506,10 +506,14 @@ def test_a_wrong_word_is_answered_by_the_right_one(small, monkeypatch, capsys, w
 
 
 @pytest.mark.parametrize("script", SCRIPTS)
-def test_scripts_explain_themselves(script, capsys):
+def test_scripts_explain_themselves(script, capsys, monkeypatch):
+    """A help text fits on a screen of 50 lines, and up to its options on 40."""
+    monkeypatch.setenv("COLUMNS", "80")
     assert run_script(script, "--help") == 0
     said = capsys.readouterr().out
     assert f"python post/{script}.py" in said and "--output" in said
+    before, _, _ = said.partition("positional arguments:")
+    assert before.count("\n") <= 40 and said.count("\n") <= 50
 
 
 # --- where scripts and packages are ---

@@ -97,7 +97,7 @@ class Option:
             return
         more: dict[str, Any] = {"default": self.default, "dest": self.name, "help": self.meaning}
         if self.choices:
-            more |= {"choices": self.choices}
+            more |= {"choices": self.choices, "metavar": self.symbol}
         else:
             more |= {"type": self.convert, "metavar": self.symbol, "nargs": self.number}
         parser.add_argument(*names, **more)
@@ -131,7 +131,7 @@ def shared(name: str, default: Any = None) -> Option:
 #: Window of time to which all analyses can be restricted.
 TIMES = Option(
     "times",
-    "only the times from START up to END, as a run of the laws then in force; 20: has no END",
+    "only the times from START up to END; 20: has no END",
     convert=time_window,
     symbol="START:END",
 )
@@ -142,9 +142,9 @@ OPTIONS: dict[str, tuple[Callable[[str], Any], str, str]] = {
     "equilibration": (
         not_negative,
         "X",
-        "equilibration: the first X collisions per disk are left out [until no observable drifts]",
+        "equilibration (collisions per disk) [until no drift]",
     ),
-    "min_separation": (float, "X", "smallest distance of two frames, in collisions per disk"),
+    "min_separation": (float, "X", "least separation of frames (collisions per disk)"),
     "wavenumber": (not_negative, "K", "wave number of F_s(k, t) times the mean diameter"),
     "disks": (disk_list, "IDS", "disks to show: numbers such as 1,5,9"),
     "colour": (str, "WHAT", f"species, {', '.join(COLOURINGS)} [species; speed if there is one]"),

@@ -281,7 +281,13 @@ ANALYSIS = Analysis(
     compute,
     draw,
     options=(
-        Option("show", "quantity to show [temperature]", "temperature", choices=[*QUANTITIES]),
+        Option(
+            "show",
+            "quantity to show, see above [temperature]",
+            "temperature",
+            symbol="NAME",
+            choices=[*QUANTITIES],
+        ),
     ),
     accepts=check,
     group_by=by_input,

@@ -365,7 +365,7 @@ ANALYSIS = Analysis(
     compute,
     draw,
     options=(
-        shared("equilibration", "the first half of each run"),
+        shared("equilibration", "first half"),
         Option("across", "axis of the profile [x]", "x", choices=("x", "y")),
         Option("cells", "number of cells of the profile [20]", None, cells_of, "N"),
         Option("grid", "cells of a map, instead of a profile", None, cells_of, "NX,NY"),

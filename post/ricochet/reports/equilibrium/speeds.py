@@ -51,7 +51,7 @@ ABOUT_BAND = (
 )
 UNSCALED = Option(
     "unscaled",
-    "draw speeds v in units of the input instead of u; all disks must have the same mass",
+    "speeds v instead of u, for disks of equal mass",
     default=False,
     convert=bool,
 )

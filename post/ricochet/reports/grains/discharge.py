@@ -266,14 +266,6 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
 ANALYSIS = Analysis(
     compute,
     draw,
-    options=(
-        Option(
-            "after",
-            "start of the steady state: earlier samples are left out [4]",
-            4.0,
-            not_negative,
-            "T",
-        ),
-    ),
+    options=(Option("after", "start of the steady state [4]", 4.0, not_negative, "T"),),
     averages=by_mouth,
 )
