@@ -6,9 +6,11 @@ Runs with the same coefficient of restitution xi are combined, and lines are mea
 With fewer than four runs, the scatter of single runs is estimated from the numbers of disks.
 
 panels
-  energy1, energy2, ...    energies per disk for each xi; bands contain 95 % of single runs
-  time, collisions         energies for all xi, divided by the initial mean, against time and
-                           against collisions per disk; bands: errors of the means
+  energy1, energy2, ...    energies per disk for each xi against time (more than three xi: against
+                           collisions per disk); bands contain 95 % of single runs
+  time, collisions         energies for all xi (more than three xi: of all disks only), divided by
+                           the initial mean, against time and against collisions per disk; bands:
+                           errors of the means
   ratio                    ratio of the temperatures of heaviest and lightest species
 
 table (a row for each restitution)

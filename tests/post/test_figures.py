@@ -1,10 +1,13 @@
 """Parts of figures other than the measured curves: bands of single runs, panels, explanations."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from matplotlib import colors
 from matplotlib.collections import EllipseCollection
 from matplotlib.quiver import Quiver, QuiverKey
+from matplotlib.text import Text
 from scipy.signal import lfilter
 
 import ricochet
@@ -104,6 +107,31 @@ def test_cooling_has_a_linear_panel_for_each_restitution(tmp_path, rng, figures)
     assert "estimated" in said and "standard errors" not in said
 
 
+def test_many_restitutions_have_named_curves_and_common_axes(tmp_path, rng):
+    """Names of curves do not overlap, and the legend lies below all panels and their labels."""
+    runs = []
+    for k, cooled in enumerate(np.sort(rng.uniform(0, 0.3, 6))):
+        draws = rng.exponential(size=(5, 30))
+        draws *= 30 * (1 - cooled * np.arange(5)[:, None] / 4) / draws.sum(axis=1)[:, None]
+        runs.append(read_run(mixture(tmp_path / f"{k}.h5", draws, cooled=cooled)))
+    for width in ("16cm", "slide"):
+        figure = ricochet.analyse("cooling", runs).figure(width=width)
+        figure.canvas.draw()
+        time, tau, ratio, *single = figure.axes
+        assert len(single) == 6 and len({axes.get_xlim() + axes.get_ylim() for axes in single}) == 1
+        for axes in (time, tau, ratio):
+            names = [text for text in axes.texts if text.get_text().startswith("ξ")]
+            assert len(names) == 6
+            boxes = [Text.get_window_extent(text) for text in names]
+            ends = sorted((box.y0, box.y1) for box in boxes)
+            assert all(low[1] <= high[0] for low, high in pairwise(ends))
+            top = np.argsort([text.xy[1] for text in names])
+            assert np.all(np.diff([boxes[k].y0 for k in top]) > 0), "in the order of the curves"
+        (legend,) = figure.legends
+        assert legend.get_window_extent().y1 < min(axes.get_tightbbox().y0 for axes in figure.axes)
+        plt.close(figure)
+
+
 def test_the_table_of_cooling_has_both_values_after_the_same_number_of_collisions(tmp_path, rng):
     """The energies of both runs fall by 10 % over time, the second in twice as many collisions."""
     runs = []
@@ -113,7 +141,7 @@ def test_the_table_of_cooling_has_both_values_after_the_same_number_of_collision
         runs.append(read_run(mixture(tmp_path / f"{k}.h5", draws, tau=tau, cooled=0.1)))
     found = ricochet.analyse("cooling", runs)
     (row,) = found.table
-    few = "Bands in the first row and of the temperature ratio: 95 % of single runs, estimated."
+    few = "Bands in panels of one ξ and of the temperature ratio: 95 % of single runs, estimated."
     assert found.notes == [f"{few} Other bands: standard errors of the mean over the runs."]
     assert row["energy_left"] == pytest.approx((0.9 + 0.95) / 2, abs=1e-6)
 

@@ -156,6 +156,11 @@ def colours(count: int, first: int = 0) -> list[str]:
     return [to_hex(colour) for colour in plt.get_cmap()(np.linspace(0, 0.9, count))]
 
 
+def ordered_colours(count: int) -> list[str]:
+    """Return colours whose order, from dark to light, is that of the values they stand for."""
+    return [to_hex(colour) for colour in plt.get_cmap()(np.linspace(0, 0.82, count))]
+
+
 def panel_grid(count: int, aspect: float) -> tuple[int, int]:
     """Return the numbers of rows and columns for `count` panels with height / width = `aspect`."""
     columns = int(np.clip(np.ceil(np.sqrt(count * aspect * 1.4)), 1, count))

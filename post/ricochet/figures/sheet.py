@@ -27,9 +27,12 @@ SLIDE_SHAPE = 9 / 16  # height / width of a slide
 SMALLEST = 8.0  # size of the smallest text [points]
 PAD = 6.0  # distance between a title and its panel [points]
 LINE = 1.35  # distance between lines of text, relative to the size of the text
+KEY = 1.8  # height of a common legend [lines]
 LETTER = 0.52  # mean width of a letter, relative to the size of the text
 HANDLE = 5  # width of the line or symbol in a legend [letters]
 TOO_LONG = "The figure is higher than a page: --panel NAME draws one panel alone."
+NAME_OFFSET = 8.0  # distance between the end of a curve and its name [points]
+CURVE_NAME = "name of a curve"  # mark of such texts
 LETTERS = 6.4  # mean number of letters of the smallest text [1/cm]
 
 
@@ -95,7 +98,9 @@ class Sheet:
         figure = plt.figure(figsize=(width * CM, width * CM))
         foot = line * (len(below) + 0.5 * bool(below))
         highest = CM * (LONGEST if width < STACKED else HIGHEST * max(1.0, width / WIDTH))
-        heights = self.draw_panels(figure, rows, highest - line * len(title) - foot)
+        key = line * KEY * bool(self.legend)
+        heights = self.draw_panels(figure, rows, highest - line * len(title) - foot - key)
+        foot += key
         whole = sum(heights) + line * len(title) + foot
         if whole > highest + 1e-6 and shape is None and sum(map(len, rows)) > 1:
             longer = wrap(TOO_LONG, letters)
@@ -114,13 +119,17 @@ class Sheet:
         if self.legend:
             self.legend(figure)
         for legend in figure.legends:
-            legend.set_bbox_to_anchor(above, figure.transFigure)
+            place = (0, (foot - key) / whole, 1, key / whole)  # between panels and notes
+            legend.set_bbox_to_anchor(place, figure.transFigure)
         for k, (text, colour) in enumerate(reversed(below)):
             figure.text(0.01, (k + 0.4) * line / whole, text, color=colour, fontsize=small)
-        if any(axes.get_aspect() != "auto" for axes in figure.axes):
+        named = any(text.get_gid() == CURVE_NAME for axes in figure.axes for text in axes.texts)
+        if named or any(axes.get_aspect() != "auto" for axes in figure.axes):
             # The shape of a panel with equal scales is known only after a layout. Drawing the
             # figure performs a second layout, without which titles would overlap.
             layout.execute(figure)
+            for axes in figure.axes:
+                separate_names(axes)
         return figure
 
     def draw_panels(self, figure: Figure, rows: list[list[Panel]], room: float) -> list[float]:
@@ -174,6 +183,39 @@ def height_of_legend(axes: Axes) -> float:
     offset = axes.titleOffsetTrans.get_matrix()[1, 2]  # type: ignore[attr-defined]
     figure = axes.get_figure(root=True)
     return max(0.0, float(offset) / (figure.dpi if figure else 72) - PAD / 72)
+
+
+def name_curve(axes: Axes, x: float, y: float, name: str, colour: str) -> None:
+    """Write the name of a curve beside its end (x, y)."""
+    axes.annotate(
+        name,
+        (x, y),
+        xytext=(NAME_OFFSET, 0),
+        textcoords="offset points",
+        va="center",
+        color=colour,
+        fontsize=plt.rcParams["legend.fontsize"],
+        gid=CURVE_NAME,
+        arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.6, "shrinkA": 1, "shrinkB": 0},
+        annotation_clip=False,
+    )
+
+
+def separate_names(axes: Axes) -> None:
+    """Shift names of curves up or down so that they do not overlap."""
+    names = [text for text in axes.texts if text.get_gid() == CURVE_NAME]
+    figure = axes.get_figure(root=True)
+    if not names or figure is None:
+        return
+    points = 72 / figure.dpi
+    height = np.array([axes.transData.transform(name.xy)[1] for name in names]) * points
+    order = np.argsort(height, kind="stable")
+    steps = LINE * names[0].get_fontsize() * np.arange(len(names))
+    above = height[order] - steps
+    # The mean of these two bounds is the increasing sequence with the smallest largest shift.
+    low, high = np.maximum.accumulate(above), np.minimum.accumulate(above[::-1])[::-1]
+    for k, place in zip(order, (low + high) / 2 + steps, strict=True):
+        names[k].xyann = (NAME_OFFSET, place - height[k])
 
 
 def wrap(text: str, letters: float) -> list[str]:

@@ -5,13 +5,14 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from ...analysis.cooling import SMOOTH, Curves, energies, flow_notes, flow_share
 from ...analysis.estimates import FEWEST_RUNS, Estimate, student
 from ...analysis.thermodynamics import lightest_and_heaviest
-from ...figures.drawing import COLOURS, band, caption, colours, dilute_limit, plt
-from ...figures.sheet import Panel, Sheet, legend_above
+from ...figures.drawing import COLOURS, band, caption, dilute_limit, ordered_colours, plt
+from ...figures.sheet import Panel, Sheet, legend_above, name_curve
 from ...predictions.theory import EQUIPARTITION
 from ...reading.reader import Restitution, Run, Species
 from ..groups import Group, grouped
@@ -19,6 +20,8 @@ from ..registry import Analysis
 from ..result import Result
 from ..tables import measured, spread
 
+FEW = 3  # largest number of groups with panels against time and a legend in the first of them
+COLUMNS = 5  # largest number of panels of single groups in a row
 TINY = np.finfo(float).tiny
 DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # line styles of the species
 
@@ -35,8 +38,9 @@ def draw_ratio(axes: plt.Axes, groups: list[Group]) -> None:
     for group in groups:
         if "ratio" in group.values:
             tau, ratio = group.values["collisions_per_disk"], group.values["ratio"]
-            style = {"color": group.colour, "label": f"{group.key:g}"}
-            band(axes, tau, ratio.mean, ratio_band(group.runs, group.values), **style)
+            reach = ratio_band(group.runs, group.values)
+            band(axes, tau, ratio.mean, reach, color=group.colour)
+            name_curve(axes, tau[-1], ratio.mean[-1], f"{group.key:g}", group.colour)
     runs = [run for group in groups for run in group.runs]
     kinds = sorted((kind.mass, kind.disks.sum()) for kind in runs[0].by_species)
     alone = all(run.nature <= {*SMOOTH, "obstacles", "walls"} for run in runs)
@@ -45,29 +49,34 @@ def draw_ratio(axes: plt.Axes, groups: list[Group]) -> None:
         dilute_limit(axes, EQUIPARTITION, "ξ = 1, ")
     axes.axhline(1, color="0.6", lw=0.8, zorder=0)
     last = max(found["collisions_per_disk"][-1] for found in results)
-    axes.set(xlabel="collisions per disk", xlim=(0, last), ylabel="temperature ratio heavy / light")
+    axes.set(
+        xlabel="collisions per disk", xlim=(0, last), ylabel="temperature ratio (heavy / light)"
+    )
     axes.xaxis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
     legend_above(axes)
 
 
 def draw_overview(axes: plt.Axes, groups: list[Group], against: str) -> None:
-    """Plot all energies on a logarithmic axis, with one colour for each restitution."""
-    run = groups[0].runs[0]
+    """Plot energies on a logarithmic axis, with one colour for each restitution.
+
+    For more than `FEW` groups, only the mean over all disks is shown.
+    """
+    shown = styles(groups[0].runs[0])[: 1 if len(groups) > FEW else None]
     for group in groups:
-        for name, style in styles(run):
-            line, curves = {"color": group.colour, "ls": style, "lw": 1.4}, group.values
-            if against == "time":
-                band(axes, curves["time"], *in_time(curves, name), **line)
-            else:
-                band(axes, curves["collisions_per_disk"], *curves[f"K_{name}"], **line)
-    if against == "time":
-        for group in groups:
-            axes.plot([], [], color=group.colour, label=f"{group.key:g}")
-        axes.set_xlabel(run.units.label("time"))
-    else:
-        for name, style in styles(run):
-            axes.plot([], [], color="0.3", ls=style, label=name)
-        axes.set_xlabel("collisions per disk")
+        for name, style in shown:
+            line, curves = (
+                {"color": group.colour, "ls": style, "lw": 1.4 + 0.4 * (len(groups) > FEW)},
+                group.values,
+            )
+            x = curves["time" if against == "time" else "collisions_per_disk"]
+            energy = in_time(curves, name) if against == "time" else curves[f"K_{name}"]
+            band(axes, x, *energy, **line)
+            if name == "all":
+                name_curve(axes, x[-1], energy.mean[-1], f"{group.key:g}", group.colour)
+    for name, style in shown if len(shown) > 1 else ():
+        axes.plot([], [], color="0.3", ls=style, label=name)
+    units = groups[0].runs[0].units
+    axes.set_xlabel(units.label("time") if against == "time" else "collisions per disk")
     axes.set(yscale="log", ylabel="energy / initial mean energy")
     low, high = axes.get_ylim()  # an elastic gas has only rounding errors
     axes.set_ylim(min(low, 0.9), max(high, 1.1))
@@ -143,49 +152,69 @@ def ratio_band(runs: list[Run], found: Curves) -> np.ndarray:
     return 2 * np.sqrt(sum(parts)) * found["ratio"].mean
 
 
-def draw_energies(axes: plt.Axes, group: Group, labelled: bool) -> None:
-    """Plot the mean energies for one coefficient of restitution on linear axes."""
-    runs, found = group.runs, group.values
+def draw_energies(axes: plt.Axes, group: Group, groups: list[Group], first: bool) -> None:
+    """Plot the mean energies for one coefficient of restitution on linear axes.
+
+    The horizontal axis is the time or, for more than `FEW` groups, the number of collisions per
+    disk, which all panels have in common.
+    """
+    runs, found, many = group.runs, group.values, len(groups) > FEW
+    x = found["collisions_per_disk" if many else "time"]
+    label = "collisions per disk" if many else runs[0].units.label("time")
     names = ("all", *runs[0].names) if len(runs[0].names) > 1 else ("all",)
     labels = {kind.name: kind.label for kind in runs[0].by_species}
     deviations = scatter(runs, found)
     for name, colour in zip(names, ("black", *COLOURS), strict=False):
         style = {"color": colour, "lw": 1.4, "label": labels.get(name, "all disks")}
-        band(axes, found["time"], found[f"energy_{name}"].mean, 2 * deviations[name], **style)
-    units, tau = runs[0].units, found["collisions_per_disk"][-1]
-    number = f"{len(runs)} runs" if len(runs) > 1 else "one run"
-    axes.set(xlim=(0, found["time"][-1]), ylim=(0, None), xlabel=units.label("time"))
-    axes.set_title(f"{group.key:g}\n{number}, {tau:.3g} collisions/disk")
-    if labelled:
-        axes.set_ylabel(units.label("mean energy per disk", "energy"))
+        band(axes, x, found[f"energy_{name}"].mean, 2 * deviations[name], **style)
+    axes.set(xlim=(0, x[-1]), ylim=(0, None), xlabel=label)
+    axes.xaxis.set_major_locator(MaxNLocator(4 if many else "auto", steps=[1, 2, 5, 10]))
+    differ = len({*map(extent, groups)}) > 1
+    axes.set_title(f"{group.key:g}" + f"\n{extent(group)}" * differ)
+    if first:
+        axes.set_ylabel(runs[0].units.label("mean energy per disk", "energy"))
+    if first and not many:
         legend_above(axes)
+
+
+def extent(group: Group) -> str:
+    """Return the number of runs and of collisions per disk of a group."""
+    number = f"{len(group.runs)} runs" if len(group.runs) > 1 else "one run"
+    return f"{number}, {group.values['collisions_per_disk'][-1]:.3g} collisions/disk"
+
+
+def legend_of_species(figure: Figure) -> None:
+    """Add a legend of the species below all panels, unless only other panels are drawn."""
+    for axes in figure.axes:
+        handles, labels = axes.get_legend_handles_labels()
+        if "all disks" in labels:
+            figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+            return
 
 
 def draw(result: Result) -> Sheet:
     """Plot the energies for each coefficient of restitution, and the temperature ratio."""
-    groups = result.groups
-    columns = min(len(groups), 3)
-    aspect = 0.35 * columns + 0.2
-    single = [
-        Panel(
-            f"energy{k + 1}",
-            draw_energies,
-            (group, k % columns == 0),
-            aspect=aspect,
-            share_y="energy1" * (k > 0),
-        )
-        for k, group in enumerate(groups)
-    ]
-    rows = [single[k : k + columns] for k in range(0, len(single), columns)]
+    groups, many = result.groups, len(result.groups) > FEW
+    columns = int(np.ceil(len(groups) / np.ceil(len(groups) / COLUMNS)))
+    aspect = 1.7 if many else 0.3 * columns + 0.2
+    single = []
+    for k, group in enumerate(groups):
+        more = {"share_y": "energy1" * (k > 0), "share_x": "energy1" * (many and k > 0)}
+        own = (group, groups, k % columns == 0)
+        single.append(Panel(f"energy{k + 1}", draw_energies, own, aspect=aspect, **more))
+    energies = [single[k : k + columns] for k in range(0, len(single), columns)]
     time = Panel("time", draw_overview, (groups, "time"), aspect=0.8)
     tau = Panel("collisions", draw_overview, (groups, "tau"), aspect=0.8, share_y="time")
-    rows.append([time, tau])
+    common = [[time, tau]]
     if any("ratio" in group.values for group in groups):
-        rows.append([Panel("ratio", draw_ratio, (groups,), aspect=0.4)])
+        common.append([Panel("ratio", draw_ratio, (groups,), aspect=0.38)])
+    rows = common + energies if many else energies + common
     words = caption(result.runs)
+    if len(extents := {*map(extent, groups)}) == 1:
+        words += f", each: {extents.pop()}" if len(groups) > 1 else f", {extents.pop()}"
     if rules := sorted({*map(rule_of, result.runs)} - {""}):
         words += f", wall rule{'s' * (len(rules) > 1)}: {', '.join(rules)}"
-    return Sheet(rows, words)
+    return Sheet(rows, words, legend_of_species if many else None)
 
 
 class Key(NamedTuple):
@@ -235,9 +264,8 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     """Return the energies of all species as functions of time and collisions per disk."""
     for group in groups:
         group.values = energies(group.runs)
-    species = max(len(group.runs[0].names) for group in groups) * (len(groups[0].runs[0].names) > 1)
-    for group, colour in zip(groups, colours(len(groups), species), strict=True):
-        group.colour = colour  # the first colours are those of the species
+    for group, colour in zip(groups, ordered_colours(len(groups)), strict=True):
+        group.colour = colour
     data = spread({suffix(group.key): group.values for group in groups})
     warnings = flow_notes([(f"{group.key:g}", group.runs) for group in groups])
     return Result(table(groups), notes=[meaning_of_bands(groups)], warnings=warnings, data=data)
@@ -246,7 +274,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
 def meaning_of_bands(groups: list[Group]) -> str:
     """Return a note on the bands in the figure (see `ratio_band`)."""
     few = [len(group.runs) < FEWEST_RUNS for group in groups]
-    text = "Bands in the first row"
+    text = "Bands in panels of one ξ"
     if any(few) and any("ratio" in group.values for group in groups):
         text += " and of the temperature ratio"
         text += "" if all(few) else f" of fewer than {FEWEST_RUNS} runs"
