@@ -100,6 +100,9 @@ class Sheet:
         highest = CM * (LONGEST if width < STACKED else HIGHEST * max(1.0, width / WIDTH))
         key = line * KEY * bool(self.legend)
         heights = self.draw_panels(figure, rows, highest - line * len(title) - foot - key)
+        if self.legend:
+            self.legend(figure)
+        key *= bool(figure.legends)
         foot += key
         whole = sum(heights) + line * len(title) + foot
         if whole > highest + 1e-6 and shape is None and sum(map(len, rows)) > 1:
@@ -116,8 +119,6 @@ class Sheet:
             wrap_labels(figure, axes)
         if title:
             figure.suptitle("\n".join(title), fontsize=small)
-        if self.legend:
-            self.legend(figure)
         for legend in figure.legends:
             place = (0, (foot - key) / whole, 1, key / whole)  # between panels and notes
             legend.set_bbox_to_anchor(place, figure.transFigure)
