@@ -39,7 +39,7 @@ def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
     assert demon_law(simulated(quiet + "&stop time = 1 /")) == pytest.approx(expected)
 
 
-def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated, tmp_path):
+def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated, tmp_path, capsys):
     text = """&side name = 'top' motion = 'constant_velocity' velocity = 0.02
     start_time = 1 end_time = 16 /
     &species count = 100 packing_fraction = 0.3 temperature = 1 / &stop time = 17 /
@@ -53,6 +53,11 @@ def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated, tmp_path):
     assert row["late_error"] == "nan" == row["ratio_error"], (
         "its energy is constant after the stroke"
     )
+    other = simulated(text, "stop.time=40", "run.seed=7", name="other")
+    (row,) = drawn(tmp_path, "driven", rested.path, other.path)
+    said = capsys.readouterr().err
+    assert float(row["late_error"]) > 0 and "samples; run longer" not in said
+    assert "fewer than" not in said, "a longer run would have the same mean"
     for change in ("contact.restitution=0.9", "box.gravity=0,-1", "side.top.motion=still"):
         words = ["velocity", "start_time", "end_time"] if "still" in change else []
         assert temperature_law(simulated(text, change, *(f"side.top.{w}=" for w in words))) is None

@@ -184,12 +184,34 @@ def test_what_speaks_against_an_error_is_said(rng):
     assert statistics.combine_runs(apart).error == pytest.approx(1, rel=0.1)
     assert statistics.combine_runs(apart).samples == 10, "a run is a sample"
     assert statistics.statistical_inefficiency(rng.normal(size=3)) > 1
-    rounded = 1 + 1e-15 * remembering(rng, 640, 100)
-    assert statistics.diagnostics("kT", [statistics.correlated_mean(rounded)]) == []
     short = statistics.correlated_mean(rng.normal(size=5))
     assert "no error" in statistics.diagnostics("Z", [short])[0]
-    slow = statistics.correlated_mean(remembering(rng, 640, 100))
-    assert "independent samples; run longer" in " ".join(statistics.diagnostics("Z", [slow]))
+    slow = [statistics.correlated_mean(remembering(rng, 640, 100)) for _ in range(100)]
+    said = [" ".join(statistics.diagnostics("Z", [one])) for one in slow]
+    assert np.mean(["independent samples; run longer" in text for text in said]) > 0.5
+
+
+@pytest.mark.parametrize("seeds", ["equal", "different"])
+def test_a_constant_has_neither_an_error_nor_a_warning(rng, seeds):
+    """Rounding errors of the constant are independent, or add up as those of an energy do."""
+    for runs in range(1, 7):
+        length, size = int(rng.integers(8, 2000)), 10 ** rng.uniform(-9, 9)
+        constants = rng.choice([-1, 1]) * size * rng.uniform(1, 2, runs)
+        if seeds == "equal":
+            constants[:] = constants[0]
+        noise = rng.normal(size=(runs, length))
+        if rng.random() < 0.5:
+            noise = np.cumsum(noise, axis=1)
+        series = constants[:, None] * (1 + 2e-16 * noise)
+        means = [statistics.correlated_mean(one) for one in series]
+        assert np.max([one.error for one in means]) <= 1e-12 * size
+        assert statistics.diagnostics("kT", means) == []
+        # Where the constant depends on the seed, only the scatter of the runs is an error.
+        unknown = [one._replace(error=np.nan) for one in means]
+        assert statistics.diagnostics("kT", unknown) == []
+        scatter = statistics.estimate([one.mean for one in means]).error
+        whole = statistics.combine_runs(unknown)
+        assert whole.error == pytest.approx(scatter, nan_ok=True)
 
 
 def test_windows_are_means():

@@ -67,6 +67,15 @@ class SeriesMean(NamedTuple):
     drift: float  # slope over its error, a standard Gaussian variable if there is no drift
     freedom: float = np.inf  # degrees of freedom of the error
 
+    @property
+    def is_constant(self) -> bool:
+        """Whether the series has no error although it is long enough for one.
+
+        The error of a constant series is 0. It is NaN if the constant depends on the seed, so that
+        only several runs have an error.
+        """
+        return self.samples >= FEWEST and not self.error > 0
+
     def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
         """Return the mean and error of offset + factor x, where x are the samples."""
         return self._replace(mean=offset + factor * self.mean, error=abs(factor) * self.error)
@@ -305,6 +314,8 @@ def has_trend(series: np.ndarray) -> bool:
 
 def diagnostics(name: str, means: Sequence[SeriesMean]) -> list[str]:
     """Return sentences that say why the mean over runs of the quantity `name` may be unreliable."""
+    if all(one.is_constant for one in means):  # longer runs would have the same means
+        return []
     found, whole = [], combine_runs(means)
     if np.isnan(whole.error):
         return [f"{name}: no error, a run has fewer than {FEWEST} samples in equilibrium"]
