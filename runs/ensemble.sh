@@ -207,7 +207,7 @@ run_member() {
     touch -- "$base.h5" && status=0
   fi
   ((status <= 128)) || tell_kill "$status" "$said" >&"$lock"
-  printf '%s %s\n' "$1" "$status" >&"$events"
+  reply "$1" "$status"
 }
 
 # Reports that a member run was killed, given its exit status and the message about earlier attempts. A member run that was
@@ -220,6 +220,11 @@ tell_kill() {
   printf '%skilled by signal %d%s, %(%FT%T%z)T on %s\n' "$given_up" "$(($1 - 128))" "$how" -1 "$host"
 }
 
+# reply MEMBER STATUS: tells the parent process how a member run ended.
+reply() {
+  printf '%s %s.\n' "$1" "$2" >&"$events"
+}
+
 # Executes all member runs that no other worker process, and no other call of this script, executes. A member run is reserved by a
 # lock on its log file. The simulation program inherits the lock, which therefore exists as long as the program runs.
 work() {
@@ -230,21 +235,21 @@ work() {
     base=$folder/${names[k]}
     if is_done "${names[k]}" || ! mkdir "$claims/$k" 2>/dev/null; then continue; fi
     if ! open_log "$base.log"; then
-      printf '%s closed\n' "$k" >&"$events"
+      reply "$k" closed
       continue
     elif ! flock -n "$lock"; then
-      printf '%s busy\n' "$k" >&"$events"
+      reply "$k" busy
     elif is_done "${names[k]}"; then
-      printf '%s 0\n' "$k" >&"$events"
+      reply "$k" 0
     elif [[ -n $share ]] && has_failed "${names[k]}"; then
-      printf '%s failed before\n' "$k" >&"$events" # because this task was requeued
+      reply "$k" 'failed before' # because this task was requeued
     else
       tell "${names[k]}" "$([[ -e $base.h5.part ]] && echo continues || echo begins)"
       run_member "$k"
     fi
     exec {lock}>&-
   done
-  printf 'worker ends\n' >&"$events"
+  reply worker ends
 }
 
 # --- parent process: starts worker processes, forwards signals, and shows the progress ---
@@ -298,14 +303,15 @@ run_all() {
   done
   set +m
   while ((ended < ${#workers[@]})); do
-    if IFS= read -r -t 1 -u "$events" part; then
-      read -r k status <<<"$message$part"
+    # The second can end within a line, or when the line has been read: only its full stop shows that a reply is complete.
+    if ! IFS= read -r -t 1 -u "$events" part && [[ -z $part ]]; then
+      kill -0 "${workers[@]}" 2>/dev/null || break # all workers were killed
+    fi
+    message+=$part
+    if [[ $message == *. ]]; then
+      read -r k status <<<"${message%.}"
       message=''
       count_reply "$k" "$status"
-    elif kill -0 "${workers[@]}" 2>/dev/null; then
-      message+=$part # the second ended within a line
-    else
-      break # all workers were killed
     fi
     show_progress
   done

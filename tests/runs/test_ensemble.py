@@ -149,6 +149,21 @@ def test_members_are_seeds_times_values(lab):
     assert "6 of 6 members finished, 0 failed" in result.stderr
 
 
+@pytest.mark.parametrize(
+    ("characters", "status"), [("$((1 + RANDOM % 6))", "142"), ("100", "$((RANDOM % 2 * 142))")]
+)
+def test_a_reply_counts_once_wherever_the_wait_for_it_ends(lab, characters, status):
+    """The time of `read -t` can be over within a line, or when the whole line has been read."""
+    read = f"""() {{
+        if [[ $* != *-t* ]]; then builtin read "$@"; return; fi
+        builtin read -n {characters} "$@"
+        return {status}
+    }}"""
+    result = ensemble(lab, "--seeds", "1-12", "-j", "4", **{"BASH_FUNC_read%%": read})
+    assert result.returncode == 0, result.stderr
+    assert "12 of 12 members finished, 0 failed" in result.stderr
+
+
 def test_members_take_a_core_each_whatever_the_cluster_says(lab, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "4")
     with (lab / "program").open("a") as program:
