@@ -100,7 +100,7 @@ generate_members() {
   local scan variable list values separator value k short old_names old_overrides known=' '
   names=("") overrides=("")
   for scan in "${scans[@]}"; do
-    [[ $scan == *.*=?* ]] || die "--scan $scan: write VARIABLE=VALUE,VALUE,..."
+    [[ $scan == *.*=?* ]] || die "--scan $scan: write GROUP.VARIABLE=VALUE,VALUE,..., as in contact.restitution=0.8,0.9"
     variable=${scan%%=*} list=${scan#*=} separator=,
     [[ $known != *" $variable "* ]] || die "--scan $variable: is given twice (--seeds is run.seed)"
     known+="$variable "

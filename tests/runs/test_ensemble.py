@@ -400,7 +400,7 @@ def test_settings_of_a_failed_member_may_be_mended(lab):
         (["--seeds", "1-"], "neither a number nor a range"),
         (["--seeds", "4-1"], "--seeds 4-1: in '4-1' the first seed exceeds the last"),
         (["--seeds", "1-2,3-x"], "'3-x' is neither a number nor a range"),
-        (["--scan", "mass"], "write VARIABLE=VALUE"),
+        (["--scan", "mass"], "write GROUP.VARIABLE=VALUE"),
         (["--seeds", "1-2", "--scan", "run.seed=1,2"], "run.seed: is given twice"),
         (["--seeds", "1", "-j", "0"], "-j 0"),
         (["--sedes", "1"], "unknown option --sedes; did you mean --seeds?"),
