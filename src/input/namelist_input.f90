@@ -8,7 +8,7 @@ module namelist_input
   use looked_up_words, only: meant_variables
   use partners, only: n_sides, side_name
   use old_names, only: new_name
-  use texts, only: digits, eol, joined, lower_case, shown, suggestion, text_t, written
+  use texts, only: digits, eol, joined, lower_case, nearest_word, shown, suggestion, text_t, written
   use variables, only: full_names, group_names, is_repeated, obstacle_groups, row_of, table, track_of, variables_of
   implicit none
   private
@@ -376,6 +376,7 @@ contains
   subroutine enter_group(self, name)
     class(reader_t), intent(inout) :: self
     character(len=*), intent(in) :: name
+    character(len=:), allocatable :: advice
     integer :: instances, g
 
     self%own = plain(name)
@@ -387,7 +388,9 @@ contains
     if (self%group > 0) instances = self%found(self%group)%number
     if (all(group_names /= name)) then
       self%complete = .false.
-      call self%problems%add(self%opened, "&"//self%own, "unknown group; "//suggestion(name, group_names))
+      advice = suggestion(name, group_names)
+      if (full_names(name) /= "") advice = "did you mean "//full_names(name)//"?"
+      call self%problems%add(self%opened, "&"//self%own, "unknown group; "//advice)
     else if (.not. is_repeated(name)) then
       if (self%found(self%group)%line > 0) call self%problems%add(self%opened, name, &
         "a second group of this name; the first is in line "//written(self%found(self%group)%line))
@@ -417,6 +420,8 @@ contains
       row = row_of(group%name, name)
       if (row == 0) then
         call self%report_unknown(group%name, name, assignment%line)
+        row = row_of(group%name, nearest_word(name, variables_of(group%name)))
+        if (row > 0) call count_as_faulty(group%values(row))
         return
       end if
       elements = -1
@@ -430,6 +435,17 @@ contains
         end if
       end associate
     end associate
+  contains
+
+    !> Of a variable whose misspelt name was reported it is not said that it is missing, too.
+    subroutine count_as_faulty(slot)
+      type(value_t), intent(inout) :: slot
+
+      if (slot%given) return
+      slot%line = assignment%line
+      slot%given = .true.
+      slot%faulty = .true.
+    end subroutine count_as_faulty
   end subroutine take_assignment
 
   !> Reports an unknown variable. The message suggests the correct name if the variable is misspelt,

@@ -253,6 +253,28 @@ def test_all_problems_come_at_once_and_the_last_line_says_so_too(checked):
 
 
 @pytest.mark.parametrize(
+    ("group", "variables"),
+    [
+        ("species", {"count": 5, "radius": 0.01}),
+        ("source", {"interval": 0.1, "temperature": 1}),
+        ("side", {"name": "'left'", "temperature": 1}),
+        ("drive", {"kind": "'noise'", "interval": 0.1, "strength": 1}),
+    ],
+)
+def test_a_misspelt_variable_is_not_said_to_be_missing(checked, group, variables):
+    for name in variables:
+        k = random.randrange(len(name) - 1)
+        typo = name[:k] + name[k + 1] + name[k] + name[k + 2 :]
+        if typo == name:
+            continue
+        names = [typo if other == name else other for other in variables]
+        given = " ".join(f"{n} = {v}" for n, v in zip(names, variables.values(), strict=True))
+        rest = "&stop events = 1 /" if group == "species" else GOOD
+        said = lines_of(checked(f"&{group} {given} /\n{rest}"))
+        assert said == [f'gas.nml:1: {group}.{typo}: unknown variable; did you mean "{name}"?']
+
+
+@pytest.mark.parametrize(
     ("content", "said"),
     [
         (b"", "gas.nml: is empty, or a pipe or a device instead of a file"),
