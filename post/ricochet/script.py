@@ -195,11 +195,15 @@ def publish(
     tables: Sequence[Table],
     notes: Sequence[str],
     data: Table | None,
+    explained: bool = False,
 ) -> None:
-    """Print tables and warnings, save the figure, and write the file of --csv."""
+    """Print tables and warnings, save the figure, and write the file of --csv.
+
+    Numbers without an error cause a further warning, unless the warnings `notes` explain them.
+    """
     if any(tables):
         print("\n\n".join(text_of(table) for table in tables if table), flush=True)
-    for note in [*notes, *without_error(tables, notes)]:
+    for note in [*notes, *([] if explained else without_error(tables))]:
         print(f"warning: {note}", file=sys.stderr)
     if figure is not None:
         save(figure, args.output, args.runs, args.title)
@@ -222,7 +226,8 @@ def run_analysis(name: str, doc: str) -> None:
         result = own.result(args.runs, args)
         figure = result.figure(args.panel, args.width)
     data = result.table if result.data is None else result.data
-    publish(args, figure, [result.shown, *result.further], result.warnings, data)
+    tables = [result.shown, *result.further]
+    publish(args, figure, tables, result.warnings, data, result.explained)
 
 
 @contextmanager

@@ -484,6 +484,7 @@ def test_fields_of_a_run_that_is_too_short_say_that_they_have_no_errors(tmp_path
         assert run_script("fields", path, "--grid", "2,2", "-o", tmp_path / "a.png") == 0
         told = [line for line in capsys.readouterr().err.splitlines() if "no error" in line]
         assert len(told) == (not known) and all("no errors: the steady" in one for one in told)
+        assert ricochet.analyse("fields", read_run(path), grid="2,2").explained == (not known)
 
 
 # --- one run ---

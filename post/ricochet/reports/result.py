@@ -41,6 +41,8 @@ class Result:
         table for the option --csv of the script [table]
     values
         results common to all groups
+    explained
+        whether a warning explains why numbers have no error
     """
 
     table: list[dict[str, Any]]
@@ -51,6 +53,7 @@ class Result:
     printed: Table | None = None
     data: Table | None = None
     values: Any = None
+    explained: bool = False
     name: str = ""  # name of the analysis
     options: Any = None
     draw: Callable[["Result"], "Sheet | None"] | None = None

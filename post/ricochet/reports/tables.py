@@ -61,10 +61,8 @@ def points(names: Sequence[str], curves: dict[tuple[Any, ...], Curve]) -> list[d
     ]
 
 
-def without_error(tables: Sequence[Table], notes: Sequence[str] = ()) -> list[str]:
-    """Return one warning if some numbers have no error and no note explains it."""
-    if any(note.startswith("no errors:") for note in notes):
-        return []
+def without_error(tables: Sequence[Table]) -> list[str]:
+    """Return one warning if some numbers have no error."""
     names = [
         name.removesuffix("_error")
         for table in map(columns, tables)

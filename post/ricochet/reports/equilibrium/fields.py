@@ -290,14 +290,16 @@ def chosen_cells(options: SimpleNamespace, axis: int) -> tuple[int, int]:
 # --- table ---
 
 
-def warnings_of(groups: list[Group], options: SimpleNamespace, own: Fields) -> list[str]:
-    """Return reasons why the state may not be steady, or why errors are unknown."""
+def warnings_of(
+    groups: list[Group], options: SimpleNamespace, own: Fields, errors: bool
+) -> list[str]:
+    """Return reasons why the state may not be steady, or why there are no `errors`."""
     runs = [run for group in groups for run in group.runs]
     cooling = [run.label for run in runs if run.nature.cooling]
     warnings = motion_notes(runs)
     warnings += [f"{name} loses energy and gains none: its state is not steady" for name in cooling]
     warnings += oscillation_notes(runs, options.equilibration, options.species)
-    if not flow_of(own.found).known:
+    if not errors:
         few = "fewer than three independent blocks of time"
         warnings.append(
             f"no errors: the steady state contains {few}; run longer, or use more seeds"
@@ -321,7 +323,8 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     runs, axis = [run for group in groups for run in group.runs], "xy".index(options.across)
     cells = chosen_cells(options, axis)
     own = fields(runs, options.equilibration, cells, options.species)
-    warnings = warnings_of(groups, options, own)
+    errors = flow_of(own.found).known
+    warnings = warnings_of(groups, options, own, errors)
     middles = places(runs[0], cells)
     data = {"x": middles[:, 0], "y": middles[:, 1]} | spread({"": own.found})
     law, stream, further = None, None, []
@@ -344,7 +347,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
         warnings.append(few)
     printed = {name: one for name, one in data.items() if "stress" not in name and not options.grid}
     values = Found(own, cells, axis, law, stream)
-    more = {"further": further, "printed": printed, "values": values}
+    more = {"further": further, "printed": printed, "values": values, "explained": not errors}
     return Result(rows_of(data), notes=notes_of(runs, values, options), warnings=warnings, **more)
 
 
