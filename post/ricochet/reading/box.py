@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .changed import value_of
+from .changed import OF_MOTION, value_of
 from .frames import Series
 from .records import Change, Obstacle, changes_in
 from .results import SIDES, Results
@@ -16,7 +16,7 @@ DRIFTING = (
     "piston",
 )  # motions of a side that change the area of the box for good
 OSCILLATING = ("sine", "parabolic")  # motions about a fixed mean position
-MOVED = ("motion", "velocity", "start_time", "end_time", "amplitude", "period", "phase")
+MOVED = OF_MOTION | {"motion"}  # variables of a side that determine its motion
 
 
 class BoxResults(Results):
