@@ -295,6 +295,8 @@ def test_nothing_is_submitted_with_a_member_whose_input_is_bad(lab, slurm):
     assert told.returncode == 1 and "nothing is submitted" in told.stderr
     assert "failed: exit_2_seed_1 (exit 2): reason of the failure" in told.stderr
     assert "1 failed" in told.stderr and not lines_of(lab / "jobs")
+    corrected = slurm("--scan", "outcome.exit=75,0", "--seeds", "1-3")
+    assert corrected.returncode == 75 and len(lines_of(lab / "jobs")) == 1
 
 
 @pytest.mark.parametrize(("options", "tasks"), [((), 2), (("--tasks", "1"), 1)])
