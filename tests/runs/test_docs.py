@@ -370,6 +370,14 @@ def test_there_is_one_version(program):
     assert f"\nversion: {version}\ndate-released: {date}\n" in cited
 
 
+def test_the_citation_contains_what_its_schema_requires():
+    """The schema 1.2.0 of the citation file format requires four keys."""
+    cited = (ROOT / "CITATION.cff").read_text()
+    assert re.search(r"^cff-version: 1\.2\.0$", cited, re.M)
+    assert re.search(r"^authors:\n  - name: \S", cited, re.M)
+    assert {"message", "title"} <= set(re.findall(r"^(\w+): \S", cited, re.M))
+
+
 COMPLETION = ROOT / "docs" / "ricochet-completion.bash"
 
 
