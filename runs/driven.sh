@@ -45,7 +45,7 @@ nut height seed_1
 compression temperature seed_1
 constant_pressure width seed_1
 heated temperature restitution_0.8_seed_1 contact.restitution=0.8,0.9
-active cluster speed_1_seed_1 drive.self_propulsion_speed=1,0
+active cluster self_propulsion_speed_1_seed_1 drive.self_propulsion_speed=1,0
 TABLE
 "$python" post/fields.py "$data"/leidenfrost/side.bottom.period_0.3_*.h5 --across y \
   -o "$figures/leidenfrost_fields.png" --csv "$figures/leidenfrost_fields.csv"

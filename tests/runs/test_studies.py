@@ -1,5 +1,6 @@
 """Tests of the scripts in runs/, with scripts that replace the programs and record the calls."""
 
+import fnmatch
 import os
 import shutil
 from pathlib import Path
@@ -44,10 +45,14 @@ def test_a_study_names_its_members_and_draws_its_figures(study, tmp_path, system
     run = study(system, "--dry-run")
     assert run.returncode == 0, run.stderr
     assert "--set " in run.stdout
+    members = {line.split("\t")[0] for line in run.stdout.splitlines()}
     for call in (tmp_path / "drawn.txt").read_text().splitlines():
         script = call.split()[0]
         folder = "lorentz" if script == "post/scatterers.py" else "figures"
         assert (ROOT / script).is_file() and f" -o runs/{folder}/" in call
+        drawn = call.partition(" -o ")[0].split()[1:]
+        for name in (Path(word).stem for word in drawn if word.endswith(".h5")):
+            assert fnmatch.filter(members, name), f"no member run is called {name}"
     if (tmp_path / "language.txt").exists():
         assert set((tmp_path / "language.txt").read_text().split()) == {"C"}
 
