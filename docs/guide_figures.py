@@ -21,6 +21,7 @@ sys.path[:0] = [str(DOCS), str(ROOT / "tests"), str(ROOT / "tests" / "runs"), st
 from page_figures import reduced  # noqa: E402
 from test_pages import blocks_of, execute, make_project  # noqa: E402
 
+os.environ["THOROUGH"] = "1"  # draws figures with their layout, which most tests omit
 GUIDES = DOCS / "guides"
 MOST, NARROW = 120_000, 700  # [bytes] and [pixels]: pictures of many disks become narrower
 
