@@ -46,6 +46,7 @@ LONG = {
     "functions-of-events",
     "gravity",
     "hard-spheres-lab",
+    "thermal-wall",
     "transport",
 }
 
