@@ -7,7 +7,7 @@
 # slightly more. Differing results reveal a dependence on the initial state. The runs of 128^2 disks start from four copies of the
 # final states of 64^2 disks, with new velocities. Without FULL=1 the script takes several minutes; P* near melting is then correct
 # to 0.1, with warnings where the two initial states give different results. FULL=1 adds longer runs, and runs of 256^2 disks, which
-# take about eight hours of processor time.
+# take 8 to 15 hours of processor time in all (runs/README.md).
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 if [[ -n ${FULL:-} ]]; then

@@ -2,6 +2,7 @@
 
 import fnmatch
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -55,6 +56,13 @@ def test_a_study_names_its_members_and_draws_its_figures(study, tmp_path, system
             assert fnmatch.filter(members, name), f"no member run is called {name}"
     if (tmp_path / "language.txt").exists():
         assert set((tmp_path / "language.txt").read_text().split()) == {"C"}
+
+
+def test_the_page_states_how_long_each_study_takes():
+    page = (ROOT / "runs" / "README.md").read_text()
+    section = page.partition("\n## How long the studies take\n")[2].partition("\n## ")[0]
+    rows = "".join(line for line in section.splitlines() if line.startswith("|"))
+    assert set(SYSTEMS) == set(re.findall(r"`(\w+)\.sh`", rows))
 
 
 def test_many_disks_near_melting_begin_as_copies_of_fewer(study):
