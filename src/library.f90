@@ -212,7 +212,7 @@ contains
     end if
     if (.not. allocated(error)) call check_motion(changed, input%path, error)
     if (.not. allocated(error)) then
-      input%text = input_of(input%groups)
+      input%text = input_of(input%given_groups)
       input%overrides = lines(:0)
       input%changes = changes_of(session)
       do k = 1, size(lines)
@@ -501,19 +501,18 @@ contains
     if (session%sim%changes_made > 0 .and. any(text_of(what) == ["input     ", "parameters"])) &
       call input_in_force(session, input, error)
     if (allocated(input%groups)) then
-      words = described(session, input%groups, text_of(what))
+      words = described(session, input, text_of(what))
     else
-      words = described(session, session%input%groups, text_of(what))
+      words = described(session, session%input, text_of(what))
     end if
     length = len(words)
     if (room > length) call give(words, text, room)
   end function copy_text
 
   !> Text that describes the simulation; see ricochet.h.
-  function described(session, groups, what) result(text)
+  function described(session, input, what) result(text)
     type(session_t), intent(in) :: session
-    !> Groups of the input for the present system.
-    type(group_t), intent(in) :: groups(:)
+    type(run_input_t), intent(in) :: input            !! input for the present system
     character(len=*), intent(in) :: what
     character(len=:), allocatable :: text
     type(growing_text_t) :: growing
@@ -521,17 +520,19 @@ contains
 
     select case (what)
     case ("input", "saved input")
-      call growing%add(input_of(groups))
+      call growing%add(input_of(input%given_groups))
     case ("parameters")
-      do g = 1, size(groups)
-        do k = 1, size(groups(g)%values)
-          if (.not. groups(g)%values(k)%is_set()) cycle
-          most = most_written
-          ! Obstacles are written with all values. The text would otherwise not describe obstacles
-          ! that were read from a file.
-          if (any(obstacle_groups == groups(g)%name)) most = huge(most)
-          call growing%add(groups(g)%value_line(k, most)//eol)
-        end do
+      do g = 1, size(input%groups)
+        associate (group => input%groups(g))
+          do k = 1, size(group%values)
+            if (.not. group%values(k)%is_set()) cycle
+            most = most_written
+            ! Obstacles are written with all values. The text would otherwise not describe obstacles
+            ! that were read from a file.
+            if (any(obstacle_groups == group%name)) most = huge(most)
+            call growing%add(group%value_line(k, most)//eol)
+          end do
+        end associate
       end do
     case ("changes")
       call growing%add(changes_of(session))

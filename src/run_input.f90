@@ -1,6 +1,6 @@
 !> Reads and checks the input of a run, and plans the changes of the system during the run
-!> (`&change`). Each change, scheduled or made in a simulation in memory, is described by the input
-!> with some values replaced.
+!> (`&change`). Each change, scheduled or made in a simulation in memory, replaces some values in a
+!> copy of the given groups. The copy is converted to settings like the groups of an input file.
 module run_input
   use box_geometry, only: box_t
   use box_sides, only: bounds
@@ -12,7 +12,7 @@ module run_input
   use input_settings, only: check_interval, resolve_settings
   use input_text, only: read_text
   use kinds, only: int64, real64
-  use namelist_input, only: read_groups
+  use namelist_input, only: override_groups, read_groups
   use partners, only: n_sides, side_name
   use settings, only: run_input_t
   use simulation_state, only: change_t
@@ -56,8 +56,8 @@ contains
     input%path = path
     input%text = text
     input%overrides = overrides
-    call read_groups(text, overrides, input%groups, problems, complete)
-    if (present(printed)) call print_text(groups_text(input%groups), error)
+    call read_groups(text, overrides, input%given_groups, problems, complete)
+    if (present(printed)) call print_text(groups_text(input%given_groups), error)
     if (allocated(error)) return
     call resolve_input(input, complete, problems, .false., stepped)
     if (problems%count == 0) call plan_changes(input, problems, stepped)
@@ -72,6 +72,7 @@ contains
     logical, intent(in) :: running                                  !! see `check_fit`
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
 
+    input%groups = input%given_groups
     if (.not. complete) return  ! variables in unreadable parts of the text are not missing
     call resolve_settings(input%groups, input%settings, problems, stepped)
     call complete_settings(input%settings, input%groups, problems, complete)
@@ -202,9 +203,10 @@ contains
 
     after%path = before%path
     after%overrides = lines
-    call read_groups(input_of(before%groups), lines, after%groups, problems, complete)
-    call drop_former_motion(before%groups, after%groups)
-    call keep_sides(before%groups, after%groups, box, t)
+    after%given_groups = before%given_groups
+    call override_groups(after%given_groups, lines, problems, complete)
+    call drop_former_motion(before%given_groups, after%given_groups)
+    call keep_sides(before%given_groups, after%given_groups, box, t)
     call resolve_input(after, complete, problems, .true., stepped)
     if (problems%count == 0) call check_entries(after, box%epoch + t, problems)
   end subroutine changed_input
@@ -235,8 +237,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(run_input_t) :: before, after
     type(problem_list_t) :: problems
-    type(group_t), allocatable :: left(:)
-    integer :: g, k, v, n
+    integer :: k
 
     after = input
     do k = 1, int(made)
@@ -246,27 +247,33 @@ contains
         call continue_sides(foreseen_box(before), after%settings%box, change%time)
       end associate
     end do
-    call move_sides(after%groups, box)
-    allocate (left(size(after%groups)))
-    v = row_of("change", "name")
-    n = 0
-    do g = 1, size(after%groups)
-      associate (group => after%groups(g), schedule => input%settings%schedule)
-        if (group%name == "change" .and. any([(schedule(k)%name == group%instance, k=1, int(made))])) cycle
-        ! the number of a change may differ from its name
-        if (group%name == "change") group%values(v)%given = .true.
-        n = n + 1
-        left(n) = group
-      end associate
-    end do
-    after%groups = left(:n)
-    after%text = input_of(after%groups)
+    call fold(after%given_groups)
+    call fold(after%groups)
+    after%text = input_of(after%given_groups)
     deallocate (after%overrides)
     allocate (after%overrides(0))
     after%settings%run%threads = input%settings%run%threads
     if (problems%count == 0) call plan_changes(after, problems, stepped=.true.)
     call problems%report(input%path, error)
     if (.not. allocated(error)) input = after
+  contains
+
+    !> Moves the sides of an input to their present positions, and removes the changes made.
+    subroutine fold(groups)
+      type(group_t), allocatable, intent(inout) :: groups(:)
+      logical :: left(size(groups))
+      integer :: g, v
+
+      call move_sides(groups, box)
+      v = row_of("change", "name")
+      left = .true.
+      do g = 1, size(groups)
+        if (groups(g)%name /= "change") cycle
+        left(g) = .not. any([(input%settings%schedule(k)%name == groups(g)%instance, k=1, int(made))])
+        groups(g)%values(v)%given = .true.      ! the number of a change may differ from its name
+      end do
+      groups = pack(groups, left)
+    end subroutine fold
   end subroutine fold_changes
 
   !> Sets the variable `position` of each side to its value in the box, which depends on the
@@ -322,18 +329,19 @@ contains
     logical :: yes, complete
     type(run_input_t) :: present_input
     type(problem_list_t) :: problems
+    type(text_t), allocatable :: sides(:)             ! overrides that create the missing groups of sides
     integer :: g
 
-    present_input%path = after%path
-    allocate (present_input%overrides(0))
+    allocate (sides(0))
     do g = 1, size(after%groups)
       associate (group => after%groups(g), now => before%groups)
         if (any(now%name == group%name .and. now%instance == group%instance)) cycle
         ! An override without a value creates the group of a side, with the default values.
-        present_input%overrides = [present_input%overrides, text_t("side."//trim(group%instance)//".motion=")]
+        sides = [sides, text_t("side."//trim(group%instance)//".motion=")]
       end associate
     end do
-    call read_groups(input_of(before%groups), present_input%overrides, present_input%groups, problems, complete)
+    present_input%given_groups = before%given_groups
+    call override_groups(present_input%given_groups, sides, problems, complete)
     call resolve_input(present_input, complete, problems, .true., stepped)
     yes = problems%count == 0
     if (yes) yes = same_values(present_input%groups, after%groups)

@@ -3,7 +3,7 @@
 module input_groups
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
-  use variables, only: allowed, either, excludes, name_length, row_of, table, words_of
+  use variables, only: allowed, either, excludes, is_repeated, name_length, row_of, table, words_of
   use texts, only: growing_text_t, written, written_exactly
   implicit none
   private
@@ -53,6 +53,7 @@ module input_groups
     procedure :: integer_of, real_of, reals_of, text_of
     procedure :: given, faulty
     procedure :: put_text, put_reals
+    procedure :: name_instance
     procedure :: complain, demand
     procedure :: infer_choices, check_choices
     procedure :: value_line
@@ -203,6 +204,17 @@ contains
 
     faulty = self%values(row_of(self%name, name))%faulty
   end function faulty
+
+  !> Assigns a default name to an obstacle, species or source without a name. The default name of a
+  !> change is its number.
+  pure subroutine name_instance(self)
+    class(group_t), intent(inout) :: self
+
+    if (.not. is_repeated(self%name)) return
+    if (self%text_of("name") == "" .and. self%name == "change") call self%put_text("name", written(self%number))
+    if (self%text_of("name") == "") call self%put_text("name", trim(self%name)//written(self%number))
+    self%instance = self%text_of("name")
+  end subroutine name_instance
 
   !> Stores a derived string as the value of a variable.
   pure subroutine put_text(self, name, text)

@@ -11,7 +11,7 @@ module input_text
   implicit none
   private
   public :: read_text, unix_lines
-  public :: assignment_t, content, cut, plain, token_t, word, unclosed, ending
+  public :: assignment_t, content, cut, plain, split_element, token_t, word, unclosed, ending
 
   integer(int64), parameter :: largest_file = 4194304   !! [bytes]
   integer, private :: i
@@ -219,5 +219,22 @@ contains
     plain = name
     if (len(name) > 30) plain = shown(name)
   end function plain
+
+  !> Splits a name such as `gravity(2)` into the name of the variable and the index of its element.
+  !> Parentheses without a number stay part of the name.
+  subroutine split_element(name, element)
+    character(len=:), allocatable, intent(inout) :: name
+    integer, intent(out) :: element                     !! index of the element; 0 without an index
+    integer :: bracket
+
+    element = 0
+    bracket = index(name, "(")
+    if (bracket == 0 .or. index(name, ")") /= len(name)) return
+    associate (number => name(bracket + 1:len(name) - 1))
+      if (number == "" .or. verify(number, digits) > 0 .or. len(number) > 8) return
+      read (number, *) element
+    end associate
+    if (element > 0) name = name(:bracket - 1)
+  end subroutine split_element
 
 end module input_text

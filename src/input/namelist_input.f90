@@ -4,7 +4,7 @@ module namelist_input
   use input_groups, only: group_t, value_t
   use input_problems, only: most_problems, problem_list_t
   use input_words, only: store_values
-  use input_text, only: assignment_t, content, cut, ending, plain, token_t, unclosed, unix_lines, word
+  use input_text, only: assignment_t, content, cut, ending, plain, split_element, token_t, unclosed, unix_lines, word
   use looked_up_words, only: meant_variables
   use partners, only: n_sides, side_name
   use old_names, only: new_name
@@ -12,7 +12,7 @@ module namelist_input
   use variables, only: full_names, group_names, is_repeated, obstacle_groups, row_of, table, track_of, variables_of
   implicit none
   private
-  public :: read_groups
+  public :: override_groups, read_groups
 
   !> Maximum number of groups with the same name, and maximum repeat count n in n*value.
   integer, parameter :: most_instances = 5000, most_repeats = 10000000
@@ -25,19 +25,18 @@ module namelist_input
     logical :: complete = .true.                    !! .false. if part of the text could not be read
     logical :: too_many = .false.                   !! .true. if too many groups have the same name
     type(value_t), allocatable :: defaults(:)       !! values of unset variables
-    !> The text being read: a default, the input text, or an override.
-    character(len=:), allocatable :: source
+    character(len=:), allocatable :: source         !! default, input text or override being read
     type(token_t), allocatable :: token(:)          !! tokens of `source`
     integer :: at = 1                               !! index of the next token
     character(len=:), allocatable :: own            !! name of the group being read, for messages
-    !> Index of the group being read; 0 if its name is unknown.
-    integer :: group = 0
+    integer :: group = 0                            !! index of the group being read; 0 if unknown
     !> First line of the group being read; 0 between groups.
     integer :: opened = 0
     !> .true. after an unclosed quotation, which may contain the / of the group.
     logical :: quote_open = .false.
   contains
     procedure :: find_defaults
+    procedure :: finish
     procedure :: open_source
     procedure :: follow
     procedure :: rest_of_line
@@ -70,7 +69,7 @@ contains
     type(problem_list_t), intent(out) :: problems
     logical, intent(out) :: complete      !! .false. if part of the text could not be read
     type(reader_t) :: reader
-    integer :: i, j, k
+    integer :: k
 
     call reader%find_defaults()
     allocate (reader%found(size(group_names) + n_sides + min(count([(text(k:k) == "&", k=1, len(text))]), &
@@ -81,23 +80,54 @@ contains
     call reader%open_source(unix_lines(text))
     call reader%read_text()
     do k = 1, reader%n
-      call name_instance(reader%found(k))
+      call reader%found(k)%name_instance()
     end do
-    do k = 1, merge(0, size(overrides), reader%too_many)
-      call reader%override(overrides(k)%text, -k)
+    call reader%finish(overrides, groups, problems, complete)
+  end subroutine read_groups
+
+  !> Applies overrides to the groups that `read_groups` returned for an input.
+  subroutine override_groups(groups, overrides, problems, complete)
+    type(group_t), allocatable, intent(inout) :: groups(:)
+    type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
+    type(problem_list_t), intent(out) :: problems
+    logical, intent(out) :: complete                                !! .false. if a quotation is unclosed
+    type(reader_t) :: reader
+    integer :: g
+
+    call reader%find_defaults()
+    reader%n = size(groups)
+    allocate (reader%found(size(groups) + n_sides))
+    reader%found(:reader%n) = groups
+    do g = 1, reader%n                    ! negative line numbers denote the overrides to be applied
+      reader%found(g)%values%line = max(reader%found(g)%values%line, 0)
     end do
-    problems = reader%problems
-    complete = reader%complete
-    allocate (groups(reader%n))
+    call reader%finish(overrides, groups, problems, complete)
+  end subroutine override_groups
+
+  !> Applies the overrides, and returns the groups with their problems.
+  subroutine finish(self, overrides, groups, problems, complete)
+    class(reader_t), intent(inout) :: self
+    type(text_t), intent(in) :: overrides(:)
+    type(group_t), allocatable, intent(out) :: groups(:)            !! as in `read_groups`
+    type(problem_list_t), intent(out) :: problems
+    logical, intent(out) :: complete
+    integer :: i, j, k
+
+    do k = 1, merge(0, size(overrides), self%too_many)
+      call self%override(overrides(k)%text, -k)
+    end do
+    problems = self%problems
+    complete = self%complete
+    allocate (groups(self%n))
     i = 0
     do j = 1, size(group_names)
-      do k = 1, reader%n
-        if (reader%found(k)%name /= group_names(j)) cycle
+      do k = 1, self%n
+        if (self%found(k)%name /= group_names(j)) cycle
         i = i + 1
-        groups(i) = reader%found(k)
+        groups(i) = self%found(k)
       end do
     end do
-  end subroutine read_groups
+  end subroutine finish
 
   !> Determines the values of unset variables.
   subroutine find_defaults(self)
@@ -467,17 +497,6 @@ contains
     call self%problems%add(line, trim(group)//"."//plain(name), "unknown variable; "//advice)
   end subroutine report_unknown
 
-  !> Assigns a default name to an obstacle, species or source without a name. The default name of a
-  !> change is its number.
-  subroutine name_instance(group)
-    type(group_t), intent(inout) :: group
-
-    if (.not. is_repeated(group%name)) return
-    if (group%text_of("name") == "" .and. group%name == "change") call group%put_text("name", written(group%number))
-    if (group%text_of("name") == "") call group%put_text("name", trim(group%name)//written(group%number))
-    group%instance = group%text_of("name")
-  end subroutine name_instance
-
   !> Applies an override `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`. VARIABLE may be an
   !> element of an array, such as `gravity(2)`. An empty VALUE restores the default.
   subroutine override(self, text, line)
@@ -519,26 +538,9 @@ contains
         self%found(g)%values(row) = slot
         call self%replace_cadence(g, name)
       end if
-      call name_instance(self%found(g))
+      call self%found(g)%name_instance()
     end if
   end subroutine override
-
-  !> Splits a name such as `gravity(2)` into the name of the variable and the index of its element.
-  !> Parentheses without a number stay part of the name.
-  subroutine split_element(name, element)
-    character(len=:), allocatable, intent(inout) :: name
-    integer, intent(out) :: element                     !! index of the element; 0 without an index
-    integer :: bracket
-
-    element = 0
-    bracket = index(name, "(")
-    if (bracket == 0 .or. index(name, ")") /= len(name)) return
-    associate (number => name(bracket + 1:len(name) - 1))
-      if (number == "" .or. verify(number, digits) > 0 .or. len(number) > 8) return
-      read (number, *) element
-    end associate
-    if (element > 0) name = name(:bracket - 1)
-  end subroutine split_element
 
   !> Removes the sampling interval that the file sets, if an override sets an interval of another
   !> kind for the same samples. The override then replaces it.

@@ -128,7 +128,7 @@ module settings
     procedure :: wants_domains
   end type settings_t
 
-  !> The input of a run in three forms: text, groups and settings.
+  !> The input of a run in several forms: text, groups and settings.
   type :: run_input_t
     character(len=:), allocatable :: path                !! path of the input file, for messages
     character(len=:), allocatable :: text                !! contents of the input file
@@ -138,6 +138,8 @@ module settings
     real(real64) :: saved_at = -1.0_real64
     !> Changes during the run: one line `TIME VARIABLE=VALUE` for each.
     character(len=:), allocatable :: changes
+    !> Groups with the values set by the user and the defaults. Changes replace values in a copy.
+    type(group_t), allocatable :: given_groups(:)
     type(group_t), allocatable :: groups(:)    !! groups with all values used in the run
     type(settings_t) :: settings                         !! the values in `groups` as typed data
   end type run_input_t

@@ -362,23 +362,19 @@ contains
     text = "["//growing%text()//eol//"]"
   end function groups_text
 
-  !> Converts groups to the text of an equivalent input file. `relative_to` is left out, because the
-  !> masses and radii of all species are final.
+  !> Converts groups, as read from an input, to the text of an equivalent input file.
   pure function input_of(groups) result(text)
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
     type(growing_text_t) :: growing
     integer :: g, k, i
-    logical :: relative
 
     do g = 1, size(groups)
       if (.not. any(groups(g)%values%given)) cycle
-      relative = any(groups(g)%values%name == "relative_to" .and. groups(g)%values%given)
       call growing%add("&"//trim(groups(g)%name)//eol)
       do k = 1, size(groups(g)%values)
         associate (value => groups(g)%values(k))
-          if (.not. value%is_set() .or. value%name == "relative_to") cycle
-          if (.not. (value%given .or. (relative .and. any(value%name == ["mass  ", "radius"])))) cycle
+          if (.not. (value%given .and. value%is_set())) cycle
           call growing%add("  "//trim(value%name)//" = ")
           if (allocated(value%reals)) then
             do i = 1, size(value%reals)
