@@ -6,7 +6,7 @@ from matplotlib.container import ErrorbarContainer
 
 import ricochet
 from ricochet.figures.drawing import plt
-from ricochet.figures.sheet import smallest_text
+from ricochet.figures.sheet import Panel, Sheet, legend_above, smallest_text
 from sampling import mostly
 from synthetic_gases import cooled, falling, gas
 
@@ -81,6 +81,45 @@ SYNTHETIC = {
 }
 
 
+@pytest.mark.parametrize(
+    ("limits", "shown"),
+    [
+        ((1e-7, 1e-4), {"1e-6", "1e-5", "0.0001"}),
+        ((0.01, 100), {"0.01", "0.1", "1", "10", "100"}),
+        ((2.1, 4.9), {"3", "4"}),
+        ((1e5, 1e7), {"100000", "1e6", "1e7"}),
+    ],
+)
+def test_ticks_of_logarithmic_axes_have_no_superscripts(limits, shown):
+    def draw(axes):
+        axes.set(xscale="log", xlim=limits)
+
+    figure = Sheet([[Panel("only", draw)]]).figure()
+    figure.draw_without_rendering()
+    axis = figure.axes[0].xaxis
+    found = {text.get_text() for text in axis.get_ticklabels() + axis.get_ticklabels(minor=True)}
+    assert shown <= found and not any("$" in text for text in found)
+    plt.close(figure)
+
+
+def test_scripts_are_as_large_as_the_smallest_text():
+    """Only texts that contain subscripts, superscripts or fractions are enlarged."""
+
+    def draw(axes):
+        for name in ("plain", "$x$", "$x^2$", r"$\frac{1}{2}$ of it"):
+            axes.plot([0, 1], label=name)
+        axes.set(xlabel="$x$", ylabel="$y_1$", title="title")
+        legend_above(axes)
+
+    figure = Sheet([[Panel("only", draw)]]).figure()
+    assert 7.999 < smallest_text(figure) < 8.001
+    (axes,) = figure.axes
+    assert axes.xaxis.label.get_size() == 9 and axes.yaxis.label.get_size() > 11
+    sizes = [text.get_size() for text in axes.get_legend().get_texts()]
+    assert sizes == pytest.approx([8, 8, 8 / 0.7, 8 / 0.7])
+    plt.close(figure)
+
+
 @pytest.fixture
 def analysed(simulated, tmp_path, rng):
     """Return a function that runs an analysis on small runs suited to it."""
@@ -104,12 +143,12 @@ def columns_of(figure):
 
 @pytest.mark.parametrize("name", mostly(ricochet.analyses, {"cooling", "scattering"}))
 def test_a_figure_fits_paper_and_screen(name, analysed):
-    """No text is below 8 points; narrow panels are stacked, and each can be drawn alone."""
+    """Letters and scripts have 8 points; narrow panels are stacked, and can be drawn alone."""
     result = analysed(name)
     sheet = result.draw(result)
     for width in ("16cm", "8.5cm", "slide"):
         figure = result.figure(width=width)
-        assert smallest_text(figure) >= 8
+        assert smallest_text(figure) >= 7.999
         words = [text.get_text() for text in figure.texts]
         height = 2.54 * figure.get_figheight()
         if width == "8.5cm":

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
+from matplotlib.ticker import LogFormatterMathtext, LogFormatterSciNotation
 
 from ..reading.files import RunError, did_you_mean
 from .drawing import STYLE
@@ -25,6 +26,8 @@ STACKED = 12.0  # width below which panels are stacked [cm]
 SLIDE = 4 / 3  # size of text on a slide, relative to paper
 SLIDE_SHAPE = 9 / 16  # height / width of a slide
 SMALLEST = 8.0  # size of the smallest text [points]
+SCRIPT = 0.7  # size of subscripts and superscripts, relative to their text
+SCRIPTS = re.compile(r"\$[^$]*(?:[_^]|\\frac)[^$]*\$")  # formula with a subscript or superscript
 PAD = 6.0  # distance between a title and its panel [points]
 LINE = 1.35  # distance between lines of text, relative to the size of the text
 KEY = 1.8  # height of a common legend [lines]
@@ -116,6 +119,7 @@ class Sheet:
         layout = ConstrainedLayoutEngine(rect=above)
         figure.set_layout_engine(layout)
         for axes in figure.axes:
+            enlarge_scripts(axes)
             wrap_labels(figure, axes)
         if title:
             figure.suptitle("\n".join(title), fontsize=small)
@@ -163,20 +167,62 @@ class Sheet:
 def legend_above(axes: Axes, **style: Any) -> None:
     """Add a legend between a panel and its title, where it hides no data."""
     handles, labels = axes.get_legend_handles_labels()
-    figure, size = axes.get_figure(root=True), float(plt.rcParams["legend.fontsize"])
+    figure = axes.get_figure(root=True)
+    size = float(plt.rcParams["legend.fontsize"])
     inches = axes.get_position().width * (figure.get_figwidth() if figure else 1.0)
     letters = inches * 72 / (LETTER * size)
-    labels = ["\n".join(wrap(label, letters - HANDLE)) for label in labels]
+    scale = [size_of(label, size) / size for label in labels]
+    labels = [
+        "\n".join(wrap(label, (letters - HANDLE) / large))
+        for label, large in zip(labels, scale, strict=True)
+    ]
     lines = [label.split("\n") for label in labels]
-    widest = max((letters_of(line) for label in lines for line in label), default=0) + HANDLE
+    widths = [
+        large * max(map(letters_of, own)) for own, large in zip(lines, scale, strict=True) if own
+    ]
+    widest = max(widths, default=0) + HANDLE
     columns = max(1, min(len(labels), int(letters / widest)))
     place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.3}
     close = {"labelspacing": 0.25, "borderpad": 0.2, "handlelength": 1.6, "columnspacing": 1.2}
-    axes.legend(handles, labels, ncols=columns, **place | close | style)
-    columns_of_lines = np.array_split([len(label) for label in lines], columns)
+    legend = axes.legend(handles, labels, ncols=columns, **place | close | style)
+    for text, large in zip(legend.get_texts(), scale, strict=True):
+        text.set_fontsize(large * size)
+    heights = [large * len(own) for own, large in zip(lines, scale, strict=True)]
+    columns_of_lines = np.array_split(heights, columns)
     height = max(sum(column) for column in columns_of_lines) + ("title" in style)
     for where in ("left", "center"):
         axes.set_title(axes.get_title(loc=where), loc=where, pad=PAD + size * LINE * height)
+
+
+class PlainLogFormatter(LogFormatterSciNotation):
+    """Labels of a logarithmic axis without superscripts, such as 0.01 or 1e-6."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Return the label of a tick, which is empty where the axis needs no label."""
+        if not super().__call__(x, pos):
+            return ""
+        return f"{x:g}".replace("e-0", "e-").replace("e+0", "e").replace("e+", "e")
+
+
+def size_of(text: str, size: float) -> float:
+    """Return the size of a text whose subscripts and superscripts are not below `SMALLEST`.
+
+    Scripts of scripts are smaller. The ratio of the sizes is a private constant of matplotlib, so
+    that only the size of the whole text can be changed.
+    """
+    return max(size, SMALLEST / SCRIPT) if SCRIPTS.search(text) else size
+
+
+def enlarge_scripts(axes: Axes) -> None:
+    """Make subscripts and superscripts legible in all texts of a panel except its legend."""
+    for axis in (axes.xaxis, axes.yaxis):
+        if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+            axis.set_major_formatter(PlainLogFormatter())
+        if isinstance(axis.get_minor_formatter(), LogFormatterMathtext):
+            axis.set_minor_formatter(PlainLogFormatter(labelOnlyBase=False))
+    titles = [child for child in axes.get_children() if isinstance(child, Text)]
+    for text in (axes.xaxis.get_label(), axes.yaxis.get_label(), *titles):
+        text.set_fontsize(size_of(text.get_text(), float(text.get_fontsize())))
 
 
 def height_of_legend(axes: Axes) -> float:
@@ -305,7 +351,14 @@ def warning_lines(warnings: Sequence[str], letters: int) -> list[str]:
 
 
 def smallest_text(figure: Figure) -> float:
-    """Return the size of the smallest visible text of a figure [points]."""
+    """Return the size of the smallest visible text of a figure [points].
+
+    Subscripts, superscripts and fractions of formulas are included, but not their own scripts.
+    """
     figure.draw_without_rendering()
     texts = [one for one in figure.findobj() if isinstance(one, Text) and one.get_visible()]
-    return min(float(text.get_fontsize()) for text in texts if text.get_text())
+    return min(
+        float(text.get_fontsize()) * (SCRIPT if SCRIPTS.search(text.get_text()) else 1.0)
+        for text in texts
+        if text.get_text()
+    )

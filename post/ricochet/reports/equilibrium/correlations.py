@@ -270,7 +270,11 @@ def curves(groups: list[Group]) -> list[dict[str, Any]]:
 AXES = {
     "vacf": {"ylabel": "velocity autocorrelation", "xscale": "log"},
     "tail": {"ylabel": "velocity autocorrelation", "xscale": "log", "yscale": "log"},
-    "msd": {"ylabel": "displacement² / $\\sigma^2$", "xscale": "log", "yscale": "log"},
+    "msd": {
+        "ylabel": "$\\langle \\Delta r^2 \\rangle\\,/\\,\\sigma^2$",
+        "xscale": "log",
+        "yscale": "log",
+    },
     "D": {"ylabel": "$D(t)\\,/\\,D_E$", "xscale": "log"},
     "F_s": {"ylabel": "$F_s(k,t)$", "xscale": "log"},
     "alpha2": {"ylabel": "$\\alpha_2$ of displacements", "xscale": "log"},
@@ -379,7 +383,7 @@ def add_theory(axes: plt.Axes, result: Result, name: str) -> None:
     groups, known = result.groups, result.groups[0].runs[0].nature <= PLAIN
     if name == "vacf" and known:
         wt = np.geomspace(min(group.values.curves["vacf"].x[0] for group in groups), 5, 200)
-        axes.plot(wt, np.exp(-wt), color="black", ls="--", lw=1, label="$e^{-wt}$")
+        axes.plot(wt, np.exp(-wt), color="black", ls="--", lw=1, label="$\\exp(-wt)$")
     elif name == "tail":
         if known:
             axes.plot([], [], color="black", ls="--", lw=1, label="mode coupling, $1/t$")

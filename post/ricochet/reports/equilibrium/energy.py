@@ -100,7 +100,7 @@ def of_each_method(runs: list[Run]) -> list[Run]:
 def draw_total(axes: plt.Axes, run: Run, is_first: bool, is_left: bool) -> None:
     """Plot the total energy of a run and its parts as functions of time on linear axes."""
     time, total = run.observable("total_energy")
-    axes.plot(time, total, color="black", lw=1.6, label="$E_{tot}$", zorder=3, **lone(time))
+    axes.plot(time, total, color="black", lw=1.6, label="total energy", zorder=3, **lone(time))
     for kind, style in (("kinetic", "-"), ("potential", ":")):  # as in the panel of species
         if f"all/{kind}_energy" in run.observables and np.any(run.gravity):
             part = run.n_disks * run.observable(f"all/{kind}_energy").value

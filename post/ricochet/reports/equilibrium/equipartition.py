@@ -127,9 +127,9 @@ def draw_approach(axes: plt.Axes, group: Group, options: SimpleNamespace, labell
         axes.errorbar(found.time, *energy, **style)
     if np.isfinite(found.thermalisation.mean):
         time = " ± ".join(rounded_to_error(*found.thermalisation))
-        label = "$T_{therm}$ = " + f"{time} {first.units.time}".rstrip()
+        label = "thermalisation time " + f"{time} {first.units.time}".rstrip()
         axes.axvline(found.thermalisation.mean, color="0.5", ls=":", lw=1.2, label=label)
-    axes.set(title=f"$v_0$ = {group.key:g},  {caption(group.runs)}", xlim=(0, options.until))
+    axes.set(title=f"initial speed {group.key:g},  {caption(group.runs)}", xlim=(0, options.until))
     axes.set(ylabel=first.units.label("⟨K⟩", "energy"), ylim=(0, None))
     if labelled:
         axes.set_xlabel(first.units.label("time"))
@@ -172,7 +172,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
             why = f"the energies never agree within {share}" if known else why
             warnings.append(f"v0 = {group.key:g}: no T_therm; {why}")
     notes = [
-        f"$T_{{therm}}$: from this time on the means differ by less than {share} for three "
+        f"From the thermalisation time on, the means differ by less than {share} for three "
         "windows. Bars: standard errors of the mean over the runs."
     ]
     return Result(rows, notes=notes, warnings=warnings)

@@ -43,12 +43,12 @@ BELOW = {"location": "bottom", "pad": 0.03, "aspect": 25}  # position of a colou
 #: Axis label of each field: text and quantity.
 LABELS = {
     "density": ("number density n", "number density"),
-    "flow_x": ("flow $u_x$", "speed"),
-    "flow_y": ("flow $u_y$", "speed"),
+    "flow_x": ("velocity along x", "speed"),
+    "flow_y": ("velocity along y", "speed"),
     "temperature": ("kT", "energy"),
     "kT_x": ("$kT_x$", "energy"),
     "kT_y": ("$kT_y$", "energy"),
-    "rotational_temperature": ("$kT_{rot}$", "energy"),
+    "rotational_temperature": ("rotational kT", "energy"),
     "stress_xx": ("kinetic stress, xx", "stress"),
     "stress_xy": ("kinetic stress, xy", "stress"),
     "stress_yy": ("kinetic stress, yy", "stress"),

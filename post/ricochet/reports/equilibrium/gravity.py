@@ -320,7 +320,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     told = [{"equilibrium_from": began, "frames": len(frames), "left_out_before": reason}]
     notes = [
         f"Frames from t = {began:.4g} on; before: {reason}.",
-        "Fits: $mv^2/2$ = {:g} to {:g} kT; $mgh$ = {:g} to {:g} kT or the lid. ".format(
+        "Fits: kinetic energies {:g} to {:g} kT; mgh = {:g} to {:g} kT or the lid. ".format(
             *SPEED_RANGE, *HEIGHT_RANGE
         )
         + "Bars: standard errors, from ten blocks of time. h is measured from the lowest position.",

@@ -39,12 +39,11 @@ EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"
 ABOUT_A2 = (
-    "$a_2 = \\langle v^4 \\rangle\\,/\\,2\\langle v^2 \\rangle^2 - 1$ is 0 for Maxwell's speeds "
-    "and $-1/2$ for equal speeds. Each point is one frame; deviations last for about 2 collisions "
-    "per disk."
+    "The second Sonine coefficient is 0 for Maxwell's speeds and -1/2 for equal speeds. Each point "
+    "is one frame; deviations last for about 2 collisions per disk."
 )
 BARS = "Bars: standard errors for the number of independent speeds"
-OVER_RUNS = "; of $a_2$: over the runs"
+OVER_RUNS = "; of the Sonine coefficient: over the runs"
 ABOUT_BAND = (
     "95 % of points in equilibrium lie in the band; neighbouring points are correlated, and "
     "several in a row can lie outside."
@@ -147,8 +146,8 @@ class Scale(NamedTuple):
     def law(self) -> str:
         """Return the Maxwell distribution as text for a legend."""
         if self.thermal == 1.0 and "u" in self.label:
-            return "Maxwell, $P(u)=2u\\,e^{-u^2}$"
-        return "Maxwell, $P(v)=(mv/kT)\\,e^{-mv^2/2kT}$"
+            return "Maxwell, $P(u)=2u\\,\\exp(-u^2)$"
+        return "Maxwell, $P(v)=(mv/kT)\\,\\exp(-mv^2/2kT)$"
 
 
 def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:
@@ -232,7 +231,7 @@ def draw_relaxation(axes: plt.Axes, groups: list[Group], state: str) -> None:
     if equal:
         dilute_limit(axes, RELAXATION)
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
-    axes.set(xlabel="collisions per disk", ylabel="second Sonine coefficient $a_2$")
+    axes.set(xlabel="collisions per disk", ylabel="second Sonine coefficient")
     axes.set_title("The way " + ("to equilibrium" if state == EQUILIBRIUM else "there"))
     legend_above(axes)
 

@@ -73,7 +73,7 @@ def draw_hits(axes: plt.Axes, run: Run) -> None:
 def draw_energy(axes: plt.Axes, run: Run) -> None:
     """Plot the remaining energy and the number of collisions as functions of time."""
     time, energy = run.observable("all/kinetic_energy")
-    axes.semilogy(time, energy / energy[0], color=COLOURS[0], label="kinetic energy $E/E_0$")
+    axes.semilogy(time, energy / energy[0], color=COLOURS[0], label="kinetic energy")
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter("")

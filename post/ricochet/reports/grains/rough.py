@@ -33,7 +33,7 @@ def draw_temperatures(axes: plt.Axes, result: Result) -> None:
     """Plot the translational and the rotational temperature on a logarithmic axis."""
     found, expected = result.values.curves, result.values.expected()
     tau = found["collisions_per_disk"]
-    for k, (name, label) in enumerate((("T", "$T$"), ("T_rot", "$T_{rot}$"))):
+    for k, (name, label) in enumerate((("T", "translational"), ("T_rot", "rotational"))):
         band(axes, tau, *found[name], color=COLOURS[k], label=label)
         axes.plot(tau, expected[k], **DASHED)
     axes.plot([], [], label="Luding et al. 1998", **DASHED)

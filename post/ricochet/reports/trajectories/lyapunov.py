@@ -96,7 +96,7 @@ def draw_distances(axes: plt.Axes, result: Result) -> None:
     mean = found.logarithm.mean(axis=0)
     axes.plot(found.time, np.exp(mean), color="black", label=f"{number} pairs: geometric mean")
     mean_slope, error = found.exponent
-    label = f"$e^{{\\lambda t}}$, $\\lambda$ = {mean_slope:.3f} ± {error:.3f}"
+    label = f"$\\exp(\\lambda t)$, $\\lambda$ = {mean_slope:.3f} ± {error:.3f}"
     ends = found.passed.mean(axis=1), np.exp([found.ends[0], found.ends[0] + found.growth.mean()])
     axes.plot(*ends, color=COLOURS[1], lw=2.5, ls="--", label=label)
     axes.set(xlabel=units.label("time t", "time"))

@@ -59,7 +59,7 @@ def draw_angles(axes: plt.Axes, result: Result) -> None:
         exact = np.degrees(scattering_angle(fine, ratio, restitution))
         axes.plot(fine, exact, color="black", ls=style, lw=1.2, label=label)
     if all(restitution == 1 for _, restitution in result.values):
-        label, heavy = "infinite mass ratio: $2\\arccos(|b|/R_{12})$", scattering_angle(fine)
+        label, heavy = "infinite mass ratio", scattering_angle(fine)
         axes.plot(fine, np.degrees(heavy), color=COLOURS[4], lw=1.2, ls="--", label=label)
     label = f"simulation, {counted(len(s), 'run')}"
     axes.plot(s, angle, ls="", marker="o", mfc="none", color=COLOURS[0], label=label)
@@ -97,7 +97,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
         if run.observable("side_collisions").value[-1].any()
     ]
     laws = sorted({law_of(run) for run in runs})
-    notes = ["An error of 0 is drawn at $10^{-16}$ degrees."]
+    notes = ["An error of 0 is drawn at 1e-16 degrees."]
     return Result(rows, notes=notes, warnings=warnings, values=laws)
 
 
