@@ -173,10 +173,9 @@ def report(
     data: Table | None = None,
     notes: Sequence[str] = (),
 ) -> None:
-    """Print the tables, save the figure, and write the file of --csv.
+    """Print the tables, save the figure, and write `data` [first table] to the file of --csv.
 
-    This file contains `data` or, if `data` is not given, the first table. The warnings `notes`, and
-    warnings about runs that ended early, appear on stderr and on the figure.
+    `notes`, and warnings about runs that ended early, appear on stderr and on the figure.
     """
     notes = [
         *(run.termination_note for run in args.runs if run.termination_note),

@@ -288,11 +288,10 @@ def haff(
 ) -> tuple[Curves, Estimate, float, Estimate]:
     """Compare the cooling of runs with the same coefficient of restitution with Haff's law.
 
-    `tracks` are results of `energy_left`, and `soft` is a result of `soft_law`. The function
-    returns four objects. The first holds curves (points,): the energy, its predictions and the
-    cooling rate. The second is the mean cooling rate per collision or, with `soft`, the exponent of
-    the decay in time. The third is the number of collisions per disk at which the gas becomes
-    inhomogeneous (NaN if it never does), and the fourth is the same number with its error.
+    `tracks` are results of `energy_left`, and `soft` is a result of `soft_law`. Returned are curves
+    (points,); the mean cooling rate per collision or, with `soft`, the exponent of the decay in
+    time; and the number of collisions per disk at which the gas becomes inhomogeneous (NaN if it
+    never does), without and with its error.
     """
     time = np.geomspace(max(t[1] for t, *_ in tracks), min(t[-1] for t, *_ in tracks), points)
     tau, by_tau = on_grid([c for _, c, _ in tracks], [(k, np.log(k)) for *_, k in tracks], points)
@@ -352,10 +351,7 @@ def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray
 
 
 def rough_law(run: Run) -> tuple[float, float, float]:
-    """Return normal and tangential restitution and I / (m r^2) of rough disks.
-
-    Raise `Refused` if the theory of cooling rough disks does not apply to the run.
-    """
+    """Return normal and tangential restitution and I / (m r^2), or raise `Refused`."""
     law = "the laws are for equal rough disks that cool in a periodic box, without contact.friction"
     allow(run, law, "inelastic", "rough", "rotating")
     if "rough" not in run.nature:

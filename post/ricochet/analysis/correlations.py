@@ -59,10 +59,9 @@ FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
 def lags_of(times: np.ndarray) -> np.ndarray:
     """Return lags (L,): 0 and twelve per decade, each with many pairs of the given samples.
 
-    In each twelfth of a decade the lag with the most pairs is chosen. It is omitted if a shorter
-    lag has more than eight times as many pairs; for this comparison, the numbers of pairs are
-    divided by the time that remains after a lag. ValueError is raised unless there are at least two
-    `times` (T,) in increasing order.
+    In each twelfth of a decade the lag with the most pairs is chosen, unless a shorter lag has more
+    than eight times as many pairs per remaining time. ValueError is raised unless there are at
+    least two `times` (T,) in increasing order.
     """
     if len(times) < 2 or not (np.diff(times) > 0).all():
         raise ValueError("lags require at least two times in increasing order")
@@ -308,8 +307,7 @@ def correlators(
 ) -> list[Correlator]:
     """Return a correlator of each run in its steady state, with the lags of the first run.
 
-    The parameters are those of `measured`. RunError is raised if a run has too few frames, or no
-    lag in common with the first run.
+    RunError is raised if a run has too few frames, or no lag in common with the first run.
     """
     refuse_others(runs)
     times = [run.time[later(run, skip)] for run in runs]

@@ -357,10 +357,7 @@ def has_few_observables(run: Run) -> bool:
 
 
 def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
-    """Return kT as a function of time: source, times (T,) and values (T,).
-
-    The source is "observables" or, if these have few samples, "frames".
-    """
+    """Return source ("observables" or "frames"), times (T,) and values (T,) of kT."""
     if not has_few_observables(run):
         time, energy = run.observable("all/kinetic_energy")
         return "observables", time, kt_of(run, run.n_disks * energy)

@@ -156,9 +156,8 @@ def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
 def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estimate:
     """Propagate the error of a curve (P,) to a number `of(curve)`, such as the time of a crossing.
 
-    The number is calculated for the curve plus and for the curve minus its error, and half of the
-    difference is its error. Mean and error are NaN if the curve has no error, or if the number is
-    NaN for one of these curves.
+    The error is half the difference between the numbers for the curve plus and minus its error.
+    Mean and error are NaN if one of these numbers is NaN.
     """
     first, last = (of(curve.mean + sign * curve.error) for sign in (-1, 1))
     error = abs(last - first) / 2

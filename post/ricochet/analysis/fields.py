@@ -116,10 +116,10 @@ def oscillation_notes(runs: list[Run], skip: float | None, species: str | None) 
 
 
 def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
-    """Return the largest statistical inefficiency of slowly varying quantities, in frames.
+    """Return the largest statistical inefficiency [frames] of slowly varying quantities.
 
-    These quantities are the total mass, momentum and energy, and the Fourier components of their
-    densities with the longest wavelength along each axis that is divided into cells.
+    These are the total mass, momentum and energy, and the Fourier components of their densities
+    with the longest wavelength.
     """
     place, v = (run.position[frames] - run.lower) / run.edges, own_motion(run, frames)
     waves, found = [np.ones(place.shape[:2])], 1.0
@@ -164,8 +164,7 @@ def block_correlation(
     """Return the correlation (F,) of neighbouring blocks of time for F fields (G, F, C).
 
     It is twice the sum of products of the deviations of neighbouring blocks, divided by the sum of
-    squared deviations. Both sums include all cells of a field, because a single cell has too few
-    blocks. The result is limited to the range from `least` (F,) to `most`.
+    squared deviations, over all cells. It is limited to the range from `least` (F,) to `most`.
     """
     size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
     rest = np.nan_to_num(members.rests())

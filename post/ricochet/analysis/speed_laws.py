@@ -138,9 +138,8 @@ def chance(found: float, drawn: np.ndarray) -> float:
 def inefficiency(counts: Sequence[np.ndarray], cumulative: bool) -> float:
     """Return the statistical inefficiency of the number of disks in bins, averaged over runs.
 
-    `counts` holds, for each run, the numbers (F, B) of disks in B bins in F frames. If
-    `cumulative`, they are summed over the bins, as in the Kolmogorov-Smirnov distance. The
-    inefficiency of a run with fewer than three frames is taken to be 1.
+    `counts` holds the numbers (F, B) of each run, summed over the bins if `cumulative`. A run with
+    fewer than three frames has the inefficiency 1.
     """
     series = [np.cumsum(own, axis=1)[:, :-1] if cumulative else own for own in counts]
     found = [statistical_inefficiency(own, LEAST) if len(own) > 2 else 1.0 for own in series]
@@ -151,9 +150,7 @@ def inefficiency(counts: Sequence[np.ndarray], cumulative: bool) -> float:
 def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
     """Return random estimates (NOISES,) of a statistical inefficiency, divided by its true value.
 
-    Each estimate is based on runs of `sizes` frames with random numbers of disks in bins. The
-    autocorrelation of these numbers decays exponentially. With 20 frames the relative noise is
-    about one third.
+    Each is based on runs of `sizes` frames whose autocorrelation decays exponentially.
     """
     if sum(sizes) > LONG:
         return np.ones(NOISES)
@@ -166,8 +163,7 @@ def noise(sizes: tuple[int, ...], true: float, cumulative: bool) -> np.ndarray:
 def correlated(values: np.ndarray, keep: float) -> np.ndarray:
     """Convert independent values (F, ..., B) to an autoregressive series of F frames.
 
-    Each frame is `keep` times the previous one plus noise. The values in the B bins of a frame are
-    deviations from the expected numbers of disks, and add up to zero.
+    The values in the B bins are deviations from the expected numbers, and add up to zero.
     """
     values = values - values.mean(axis=-1, keepdims=True)
     for k in range(1, len(values)):

@@ -25,9 +25,7 @@ def kt_of_frames(
 ) -> np.ndarray:
     """Return kT (F,) in frames, relative to the shear flow and to the centre of mass.
 
-    The motion of the centre of mass is subtracted along axes where momentum is conserved. `species`
-    selects disks. The result is the mean of kT_x and kT_y, kT_x if `component` is 0, or kT_y if it
-    is 1.
+    The result is the mean of kT_x and kT_y, or one of them if `component` is 0 or 1.
     """
     own = slice(None) if species is None else run.of_species(species)
     energy = thermal_energy(run, frames, component)[:, own].mean(axis=1)

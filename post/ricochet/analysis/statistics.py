@@ -179,11 +179,10 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
     """Return standard error of the mean, degrees of freedom and drift of a series (T,).
 
     The squared error is the mean square of the lowest coefficients of a cosine transform (Lazarus
-    et al., Journal of Business and Economic Statistics 36, 541 (2018)). Coefficients are included
-    if their periods are longer than the inefficiency plus its standard deviation (Madras and Sokal,
-    Journal of Statistical Physics 50, 109 (1988)). The drift is the first coefficient, divided by
-    the root mean square of the other ones. This ratio follows Student's distribution and is
-    converted to a standard Gaussian variable.
+    et al., Journal of Business and Economic Statistics 36, 541 (2018)), those with periods longer
+    than the inefficiency plus its standard deviation (Madras and Sokal, Journal of Statistical
+    Physics 50, 109 (1988)). The drift is the first coefficient over the root mean square of the
+    others (Student's distribution), converted to a standard Gaussian variable.
     """
     parts = cells(series, FINE)
     per_sample, lag = inefficiency_and_lag(parts, LEAST_INEFFICIENCY)
@@ -204,11 +203,9 @@ def slow_waves(series: np.ndarray) -> tuple[float, int, float]:
 def periodic_waves(parts: np.ndarray, per_sample: float) -> tuple[float, int]:
     """Return standard error of the mean and degrees of freedom of an anticorrelated series (T,).
 
-    The running sum of such a series is bounded. An example is the momentum of a gas, the sum of the
-    impulses of two walls. Only the two ends of the running sum contribute to the variance of the
-    mean. They contribute the same amount to the power of a Fourier transform, but twice as much to
-    the power of a cosine transform. A cosine transform would therefore overestimate the variance.
-    The power rises as the square of the frequency. Fewer coefficients are used if the inefficiency
+    The running sum of such a series, such as the momentum of a gas, is bounded, so that only its
+    two ends contribute to the variance of the mean. A cosine transform would count them twice. The
+    power rises as the square of the frequency; fewer coefficients are used if the inefficiency
     `per_sample` is smaller, so that the relative bias stays the same.
     """
     most = min(MOST_WAVES, len(parts) // 2) // 2

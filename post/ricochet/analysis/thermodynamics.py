@@ -345,10 +345,7 @@ def has_log(run: Run) -> bool:
 
 
 def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """Return the rates "w_A_B" [1/time] at which a disk of species A collides with species B.
-
-    RunError is raised if there is no event log.
-    """
+    """Return the rates "w_A_B" [1/time] at which a disk of A collides with B (from event logs)."""
     log, species = run.event_log(), run.species - 1
     cuts = np.linspace(start_of_equilibrium(run, skip), run.time[-1], FINE + 1)
     pairs = log.j > 0

@@ -188,10 +188,8 @@ def relative_error(samples: int, lag: int) -> float:
 def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
     """Estimate a transport coefficient from the increments of a Helfand moment (T, C).
 
-    It is half the slope of the mean squared increment between the lags `lag` / 2 and `lag`. Each
-    time origin yields a value. These values are too few, and too far from Gaussian, for an estimate
-    of the error. The error is therefore calculated by `relative_error` for C components. The drift
-    is measured in the series of values.
+    It is half the slope of the mean squared increment between the lags `lag` / 2 and `lag`, with
+    the error of `relative_error` for C components and the drift over the time origins.
     """
     half = lag // 2
     near, far = squares(moment, half), squares(moment, lag)

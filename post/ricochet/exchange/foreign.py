@@ -33,8 +33,7 @@ GROUPS = ("particles", "bonds", "angles", "dihedrals", "impropers", "constraints
 def check_index(path: Path) -> None:
     """Raise ValueError if a GSD file is shorter than its header or index implies.
 
-    The package gsd trusts the counts and positions in a file. If a file is damaged, gsd would
-    allocate too much memory, or read beyond the end of the file.
+    The package gsd would allocate too much memory, or read beyond the end of the file.
     """
     size = path.stat().st_size
     with path.open("rb") as file:

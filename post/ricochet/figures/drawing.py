@@ -81,10 +81,7 @@ def stated(name: str, values: set[float]) -> str:
 
 
 def by_chance(runs: list[Run]) -> set[str]:
-    """Return the names of packing fractions whose values differ only because radii are random.
-
-    This is the case for species with the same number of disks, mean radius and region.
-    """
+    """Return the names of packing fractions whose values differ only because radii are random."""
     given: dict[str, set[tuple[bool, str]]] = {}
     for run in runs:
         for kind in run.names:

@@ -93,9 +93,8 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
 
     Positions are 16-bit integers relative to the visible region, velocities relative to the largest
     component in the frame; for few disks both have full precision. Numbers of collisions are bytes;
-    the byte 255 represents `top`. Changes of the image counters along x and y since the previous
-    frame have four bits each. The number of times a disk was recycled is stored modulo 256. In an
-    open system, a 1 marks each disk in the box.
+    255 represents `top`. Changes of the image counters have four bits each; numbers of recyclings
+    are modulo 256. In an open system, a 1 marks each disk in the box.
     """
     found: dict[str, bytearray] = defaultdict(bytearray)
     at_once = max(1, MOST_AT_ONCE // run.n_disks)
@@ -131,9 +130,8 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
 def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
     """Return collisions per disk up to each frame, and events and paths if the log is not too long.
 
-    An event has a time and two partners. Paths are stored as the number of velocity changes in each
-    interval between frames and, for each change, the disk, the fraction of the interval and the new
-    velocity.
+    An event has a time and two partners. A path has the number of velocity changes in each interval
+    and, for each change, the disk, the fraction of the interval and the new velocity.
     """
     exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
     try:
@@ -198,9 +196,7 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
 def curves(run: Run) -> dict:
     """Return the energy of each species and the pressure as functions of time, for small plots.
 
-    Both are based on the observables, which are sampled more often than frames are stored. Missing
-    values, and the pressure before the first collision, are None. For an open system, the curves
-    include the number of disks inside, and the numbers that have left and entered.
+    Missing values are None. An open system also has the numbers of disks inside, left and entered.
     """
     series, found = {}, {}
     moved = passages(run.observables) if "open" in run.nature else {}
@@ -240,10 +236,7 @@ def curves(run: Run) -> dict:
 
 
 def scene(run: Run) -> tuple[dict, dict]:
-    """Return the constant data of a film: box, obstacles, species and disks.
-
-    `run` is a `Run`, or another object with the same attributes.
-    """
+    """Return the constant data of a film of `run`: box, obstacles, species and disks."""
     radii, own = radii_of(run)
     facts = {
         "exact": run.n_disks <= FEW_DISKS,

@@ -217,8 +217,7 @@ def serve(
 ) -> str:
     """Show a run until it ends or Ctrl-C or TERM arrives; return why the server stopped.
 
-    `open_page` is called with the address of the page. RunError is raised if the file cannot be
-    shown, or if the simulation program was killed.
+    RunError is raised if the file cannot be shown, or if the simulation program was killed.
     """
     if run.path.suffix != ".part":
         raise RunError(f"{run.path}: has finished; leave out --live")

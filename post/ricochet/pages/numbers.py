@@ -99,10 +99,7 @@ def observed(simulation: Simulation) -> dict[str, float]:
 
 
 def sampled(count: int, value: dict) -> tuple[float, ...]:
-    """Return the quantities from which means are computed: time, energy, virial, area.
-
-    The energy is that of all `count` disks or, in an open system, of the disks in the box.
-    """
+    """Return time, energy (of the disks in the box), virial and area at each sample."""
     time, mean, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
     kinetic = mean * inside if (inside := value.get("inside", count)) else 0.0
     whole = kinetic + (virial / (2 * time) if time else 0.0)
@@ -155,12 +152,10 @@ def means(run: Run, samples: Sequence[tuple[float, ...]], energy: float) -> list
 def relaxed_means(run: Run, columns: np.ndarray, kt: float | None) -> list[SeriesMean | None]:
     """Return the means of temperature, mean speeds and pressure after the relaxation.
 
-    Samples in the first `SPEEDS_FORGET` collisions per disk are left out, and means are returned
-    only after twice this number of collisions per disk. An error is NaN if it has too few degrees
-    of freedom, or if the run is not several times longer than the decay time of slow fluctuations.
-    Fluctuations of the total momentum affect the temperature. Fluctuations of the total energy, in
-    contact with a heat bath, affect all quantities. In a run shorter than their decay time, samples
-    look independent, although all of them deviate from the mean in the same direction.
+    They are returned after twice `SPEEDS_FORGET` collisions per disk. An error is NaN with too
+    few degrees of freedom, or if the run is not several times longer than the decay time of slow
+    fluctuations: of the total momentum or, with a heat bath, of the total energy. In a shorter run,
+    samples look independent, although all deviate from the mean in the same direction.
     """
     tau = columns[KEPT - 1]
     first = max(map(equilibration, columns[KEPT:]))

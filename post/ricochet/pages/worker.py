@@ -516,9 +516,8 @@ def scan(request: dict) -> None:
 def measure(text: str, lines: list[str], name: str, seconds: float) -> tuple[float, float | None]:
     """Return the time average of an observable and its error, after at most `seconds`.
 
-    For a count (`COUNTED`) this is the rate of growth. Samples are half a collision per disk apart.
-    The second half of the samples is averaged. An error is returned only if the run relaxes to
-    equilibrium.
+    For a count (`COUNTED`) this is the rate of growth. Samples are half a collision per disk apart;
+    the second half is averaged. An error is returned only if the run relaxes to equilibrium.
     """
     samples, began = [], time.perf_counter()
     with Simulation._of(text, lines) as simulation:

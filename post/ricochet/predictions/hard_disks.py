@@ -162,14 +162,14 @@ def adiabat(
 ) -> np.ndarray:
     """Return the temperatures (W,), relative to the first, of a gas between walls moved slowly.
 
-    The `widths` (W,) are the distances between the two walls, and `height` is the distance between
-    the other two sides. Unless the other two sides are walls (`walled`), the momentum parallel to
-    the two walls is conserved, and the kinetic energy is (N - 1/2) kT in place of N kT. When the
-    width w changes by dw, work changes the kinetic energy by -F dw. F is the pressure P of
-    `simulated` times the height, minus the tension of the other two walls. In scaled particle
-    theory, the tension of a wall is kT n r / (1 - eta), and the number of disks missing beside the
-    wall is n r (1 - eta) / (1 + eta) per length (Helfand, Frisch and Lebowitz, Journal of Chemical
-    Physics 34, 1037 (1961)).
+    The `widths` (W,) are the distances between the two walls; `height` is the distance between the
+    other two sides. Unless these are walls (`walled`), the momentum along them is conserved, and
+    the kinetic energy is (N - 1/2) kT in place of N kT.
+
+    Work changes it by -F dw, with F = P `height` (P: pressure of `simulated`) minus the tension of
+    the other walls. In scaled particle theory, the tension is kT n r / (1 - eta), and n r (1 - eta)
+    / (1 + eta) disks per length are missing beside a wall (Helfand, Frisch and Lebowitz, Journal of
+    Chemical Physics 34, 1037 (1961)).
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FREEZING[-1, 0], 50001)  # far from the walls

@@ -16,14 +16,13 @@ def virial_pressure(
 ) -> float:
     """Return the observable `virial_pressure` / kT [1/length^2] of a fluid in a rectangular box.
 
-    The result is (F_x L_x + F_y L_y) / (2 A kT). F is the force on a side, and L is the mean
-    distance between the centre of a disk touching this side and the centre of one touching the
-    opposite side. The fluid consists of S species with numbers and radii (S,); the box has the
-    lengths `edges` (2,), and `walls` (2,) marks the axes that are not periodic. The tension of the
-    walls and the number of disks missing beside them are calculated as in Helfand, Frisch and
-    Lebowitz, Journal of Chemical Physics 34, 1037 (1961), extended to mixtures. The bulk pressure
-    is given by Henderson's equation of state, for mixtures with `of_sizes`. The result is NaN if
-    the box is too small for a fluid.
+    The result is (F_x L_x + F_y L_y) / (2 A kT): F is the force on a side, and L the mean distance
+    between the centres of disks that touch opposite sides. The fluid has S species with numbers and
+    radii (S,), the box `edges` (2,), and `walls` (2,) marks the axes that are not periodic.
+
+    Tension and missing disks beside the walls are those of Helfand, Frisch and Lebowitz, Journal of
+    Chemical Physics 34, 1037 (1961), extended to mixtures; the bulk pressure is Henderson's, for
+    mixtures with `of_sizes`. The result is NaN if the box is too small for a fluid.
     """
     count, radius, edges, walls = (
         np.asarray(x, dtype=float) for x in (count, radius, edges, walls)

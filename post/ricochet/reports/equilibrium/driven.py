@@ -181,10 +181,7 @@ def levels(law: Law, compared: Callable) -> list:
 
 
 def styles_of(result: Result) -> dict[tuple[str, str], dict[str, Any]]:
-    """Return colour and line style of each curve.
-
-    A colour denotes an input, or a species as in the pictures of disks.
-    """
+    """Return colour and line style of each curve; a colour denotes an input or a species."""
     kinds = any(species for group in result.groups for species in group.values.tracks)
     styles = {}
     for k, group in enumerate(result.groups):

@@ -110,10 +110,9 @@ def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndar
 def mean_and_density(
     runs: list[Run], skip: float | None = None
 ) -> tuple[Estimate, Estimate] | None:
-    """Return the mean free path, and the probability density of free paths divided by their mean.
+    """Return the mean free path and the density of free paths / mean, or None without event log.
 
-    The errors are estimated from the scatter of the runs or, for a single run, of blocks of frames.
-    Without an event log, the result is None.
+    The errors are estimated from the scatter of the runs or, for one run, of blocks of frames.
     """
     parts = [free_paths(run, skip) for run in runs if td.has_log(run)]
     if not parts or sum(len(path) for path, _ in parts) == 0:

@@ -57,10 +57,7 @@ def draw_ratio(axes: plt.Axes, groups: list[Group]) -> None:
 
 
 def draw_overview(axes: plt.Axes, groups: list[Group], against: str) -> None:
-    """Plot energies on a logarithmic axis, with one colour for each restitution.
-
-    For more than `FEW` groups, only the mean over all disks is shown.
-    """
+    """Plot energies on a logarithmic axis; for more than `FEW` groups, only those of all disks."""
     shown = styles(groups[0].runs[0])[: 1 if len(groups) > FEW else None]
     for group in groups:
         for name, style in shown:

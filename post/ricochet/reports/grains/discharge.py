@@ -155,11 +155,7 @@ def measured_rates(runs: list[Run], after: float) -> Rates:
 
 
 def fit_of(found: Rates) -> dict[str, Estimate]:
-    """Fit Beverloo's law to measured rates; return {} for fewer than three widths.
-
-    If the errors of the rates are unknown, the errors of the fit are estimated from the scatter of
-    the points.
-    """
+    """Fit Beverloo's law to measured rates; return {} for fewer than three widths."""
     x, y, error = points(found.rows)
     if found.complete and np.all(error > 0):
         return fitted(x, y, error, found.independent)
