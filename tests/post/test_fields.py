@@ -191,7 +191,7 @@ def test_the_oscillation_of_a_bed_is_told_apart_from_heat(tmp_path, rng, capsys)
     given = ((calm, {}), (bed, {"species": "grain"}))
     shown = [ricochet.analyse("fields", path, across="y", **more).figure() for path, more in given]
     labels = [figure.axes[2].get_legend_handles_labels()[1] for figure in shown]
-    assert labels == [["measured"], ["kT", "$kT_x$", "$kT_y$"]]
+    assert labels == [["measured"], ["kT", "kT, x", "kT, y"]]
     assert "fields of the species 'grain' (30 disks)" in shown[1].get_suptitle()
     drawn(tmp_path, "fields", calm)
     assert capsys.readouterr().err == ""

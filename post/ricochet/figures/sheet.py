@@ -268,10 +268,10 @@ def separate_names(axes: Axes) -> None:
 def wrap(text: str, letters: float) -> list[str]:
     """Split a text into lines of about the given number of letters.
 
-    Formulas, texts in parentheses and expressions such as x = 1 are not split.
+    Formulas, texts in parentheses and expressions such as x = 1 ± 2 are not split.
     """
     lines: list[str] = []
-    for word in re.findall(r"\([^()]*\)\S*|(?:\$[^$]*\$|[^\s$]| = )+", text):
+    for word in re.findall(r"\([^()]*\)\S*|(?:\$[^$]*\$|[^\s$]| [=±] )+", text):
         if lines and letters_of(f"{lines[-1]} {word}") <= letters:
             lines[-1] += f" {word}"
         else:

@@ -193,15 +193,15 @@ def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
     return fit._replace(exponent_error=float(jackknife(fit.exponent, exponents).error))
 
 
-def power(axis: str, fit: PowerLaw | None) -> str:
-    """Return the fitted power law as text for a legend."""
+def power(fit: PowerLaw | None) -> str:
+    """Return the exponent of a fitted power law as text for a legend."""
     if not fit:
         return ""
     exact = max(abs(fit.exponent), fit.exponent_error) < ROUNDING
-    exponent = "\\pm".join(rounded_to_error(fit.exponent, fit.exponent_error))
+    exponent = " ± ".join(rounded_to_error(fit.exponent, fit.exponent_error))
     exponent = "0" if exact else exponent
-    missed = f", $\\chi^2$/dof {fit.chi2:.2g}" if fit.missed else ""
-    return f" $\\propto {SYMBOLS[axis]}^{{{exponent}}}${missed}"
+    missed = f", χ²/dof {fit.chi2:.2g}" if fit.missed else ""
+    return f", exponent {exponent}{missed}"
 
 
 def draw_size(
@@ -233,7 +233,7 @@ def draw_sizes(
     for curve, values, shade in zip(scan, shared, colours(len(scan)), strict=True):
         for (name, title), colour, marker in zip(names.items(), own, MARKERS, strict=False):
             fit = fit_of(axis, curve, name)
-            label = "" if varying else title + power(axis, fit)
+            label = "" if varying else title + power(fit)
             style = {"color": shade if varying else colour, "marker": marker, "label": label}
             draw_size(axes, axis, curve, name, fit, **style)
         if varying:
