@@ -55,9 +55,13 @@ def test_both_ends_of_each_slider_run(path, monkeypatch, program):
                 run.advance(time=1e-3)
 
 
-def test_the_links_of_the_lesson_lead_to_the_inputs_with_these_titles():
+@pytest.mark.parametrize(
+    ("page", "inputs"),
+    [("lesson", {"gas", "mixture", "cooling", "crater"}), ("collisions-lesson", {"collision"})],
+)
+def test_the_links_of_a_lesson_lead_to_the_inputs_with_these_titles(page, inputs):
     """Values that differ from the input are values of its sliders, and each heading has one."""
-    text = (ROOT / "docs/tutorials/lesson.md").read_text()
+    text = " ".join((ROOT / f"docs/tutorials/{page}.md").read_text().split())
     shown = set()
     for title, link in re.findall(r"\[([^\]]+)\]\((http://[^)]+)\)", text):
         address = urlsplit(link)
@@ -71,4 +75,4 @@ def test_the_links_of_the_lesson_lead_to_the_inputs_with_these_titles():
             low, high, *_ = sliders[variable]
             assert low <= float(value) <= high
         shown.add(name)
-    assert shown == {"gas", "mixture", "cooling", "crater"}
+    assert shown == inputs
