@@ -140,7 +140,8 @@ function round(low, high) {
 }
 
 // Plots curves { time, values, colour, dash, letter } against time on an axis that includes 0. Curves are pale after the time
-// `now`; null values leave gaps. Returns a function that converts times to pixels.
+// `now`; null values leave gaps; a single value is a point. Each value of curves with `steps` holds until the next sample.
+// Returns a function that converts times to pixels.
 function plotLines(canvas, lines, now) {
   const range = lines.map(({ time }) => [time[0], time.at(-1)]), start = Math.min(...range.map(([t]) => t));
   const end = Math.max(...range.map(([, t]) => t)), plot = prepare(canvas), { pen } = plot;
@@ -148,7 +149,7 @@ function plotLines(canvas, lines, now) {
   for (const { values } of lines) for (const value of values) if (value < low) low = value; else if (value > high) high = value;
   const { x, y } = axes(plot, [start, end > start ? end : start + 1], [low, low + 1.06 * (high - low || 1)], 'time');
   pen.lineJoin = 'round';
-  for (const { time, values, colour, dash = [], letter } of lines) {
+  for (const { time, values, colour, dash = [], letter, steps } of lines) {
     const seen = upTo(time, now);
     Object.assign(pen, { lineWidth: letter ? 1.2 : 1.8, strokeStyle: colour, fillStyle: colour });
     pen.setLineDash(dash);
@@ -156,12 +157,14 @@ function plotLines(canvas, lines, now) {
       pen.globalAlpha = alpha;
       pen.beginPath();
       for (let k = from, drawn = false; k < to; k++) {
+        if (values[k] !== null && drawn && steps) pen.lineTo(x(time[k]), y(values[k - 1]));
         if (values[k] !== null) pen[drawn ? 'lineTo' : 'moveTo'](x(time[k]), y(values[k]));
         drawn = values[k] !== null;
       }
       pen.stroke();
     }
     pen.globalAlpha = 1;
+    if (time.length === 1 && values[0] !== null) pen.fillRect(x(time[0]) - 2, y(values[0]) - 2, 4, 4);
     if (letter) pen.fillText(letter, Math.min(plot.right, x(time.at(-1)) + 10), Math.max(y(values.at(-1) ?? 0) - 12, 0));
   }
   pen.setLineDash([]);
@@ -318,11 +321,15 @@ const lastOf = (name, s) => {
   return values?.[Math.max(0, upTo(time, moment.time) - 1)] ?? null;
 };
 
+// Without gravity, the kinetic energy of a few disks changes only in events. The steps of very many disks are too small to be
+// seen; their samples are connected by lines.
+const isStepwise = () => film.exact && !film.gravity.some(Boolean);
+
 function drawEnergies() {
   const lines = [], add = (curves, own, letter) => {
     for (const [name, dash] of Object.entries(ENERGIES)) curves[name]?.forEach((values, s) => lines.push({
       time: curves.time, values: state.total ? values.map((e, k) => e === null ? e : e * (curves.inside?.[s][k] ?? own[s].count)) : values,
-      colour: curveColour(s, letter), dash, letter,
+      colour: curveColour(s, letter), dash, letter, steps: isStepwise(),
     }));
   };
   for (const { letter, curves, kinds: own } of overlaid) add(curves, own, letter);

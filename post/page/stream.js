@@ -6,7 +6,8 @@
 // memory for frames [bytes]; numbers before the positions in a message; samples in a plot
 const PAST_ROOM = 6e7, HEAD = 7, MOST_CURVE = 3000;
 const SAME_TIME = 1e-13;  // largest relative difference of two times that count as equal
-const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
+const NOTHING = { next: [], happened: null };
+const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, isChanged: true, curves: null, run: 0, wish: null };
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
 
@@ -38,11 +39,34 @@ function start(run) {
 // Stops the worker process if placing the disks takes too long. A new worker process then executes the next run.
 function leave() { stream.socket?.leave(); }
 
+// Appends a sample to the curves. Lists without a new value keep the last one. Every second sample is removed if there are many.
+function addSample(curves, news) {
+  const { time } = news, before = curves.news.at(-1);
+  curves.time.push(time);
+  curves.news.push(news.means ? news : before);
+  for (const name of [...Object.keys(ENERGIES), 'inside']) curves[name]?.forEach((values, s) => values.push((name in news ? news[name]?.[s] : values.at(-1)) ?? null));
+  for (const name of ['pressure', 'left', 'entered']) curves[name]?.push((name in news ? news[name] : curves[name].at(-1)) ?? null);
+  if (curves.time.length <= MOST_CURVE) return;
+  const thin = list => Array.isArray(list?.[0]) ? list.map(thin) : list?.filter((_, k) => k % 2 === 0);
+  for (const name of Object.keys(curves)) curves[name] = thin(curves[name]);
+}
+
+// Appends the energies immediately before and after an event of a few disks, so that the curve has a step at this time.
+function addStep({ time, before, kinetic, potential, rotational }) {
+  const { curves } = stream;
+  if (!(time >= curves.time.at(-1))) return;
+  const energy = i => masses[i] * (before[i][0] ** 2 + before[i][1] ** 2) / 2;
+  const sums = kinds.map((kind, s) => before.reduce((sum, _, i) => sum + (speciesOf[i] === s ? energy(i) / kind.count : 0), 0));
+  addSample(curves, { time, kinetic: sums, ...potential && { potential } });
+  addSample(curves, { time, kinetic, ...potential && { potential }, ...rotational && { rotational } });
+}
+
 const hear = {
   scene({ facts, blocks, run, changed }) {
     Object.assign(facts, { events: facts.exact, colour: facts.species.length > 1 ? 'species' : 'speed' });
     const names = list => list?.map(({ name }) => name).join();
     if (names(kinds) === names(facts.species)) facts.colour = state.colour;
+    stream.isChanged = true;
     if (changed) {
       film = { ...film, ...facts, changes: film.changes, scales: film.scales, speeds: film.speeds };
       kinds = film.species;
@@ -54,25 +78,21 @@ const hear = {
   },
   numbers(news) {
     const { curves } = stream, { time } = news;
-    if (time <= curves.time.at(-1)) {  // a change at this time
-      curves.news[curves.news.length - 1] = news;
-      return;
-    }
-    curves.time.push(time);
-    curves.news.push(news);
-    for (const name of [...Object.keys(ENERGIES), 'inside']) curves[name]?.forEach((values, s) => values.push(news[name]?.[s] ?? null));
-    for (const name of ['pressure', 'left', 'entered']) if (curves[name]) curves[name].push(news[name]);
-    if (curves.time.length > MOST_CURVE) {
-      const thin = list => Array.isArray(list?.[0]) ? list.map(thin) : list?.filter((_, k) => k % 2 === 0);
-      for (const name of Object.keys(curves)) curves[name] = thin(curves[name]);
-    }
+    // At an event of a few disks the curves already have a sample of this time. A change by the user at this time is a step.
+    const isKnown = time <= curves.time.at(-1) && news.kinetic.every((energy, s) => energy === curves.kinetic[s].at(-1));
+    if (isKnown) curves.news[curves.news.length - 1] = news; else addSample(curves, news);
     film.settles = news.settles;
     fitScales(news.speed);
+    if (!state.playing && source) show(moment.time, true);
   },
   events(news) {
     const own = ([time, i, j]) => [time, i - 1, j - 1];
-    Object.assign(stream.events, { next: news.next.map(own), happened: news.happened && own(news.happened) });
-    encounter.collisions.push(...news.encounters);
+    const next = news.next.map(own), known = past.at(-2)?.coming?.next ?? [];
+    const isSame = next.length === known.length && next.every(([time], k) => time === known[k][0]);  // most frames share a list
+    past.at(-1).coming = { next: isSame ? known : next, happened: news.happened && own(news.happened) };
+    stream.isChanged = false;
+    news.encounters.forEach(addStep);
+    encounter.collisions.push(...news.encounters.filter(({ disks: pair }) => pair));
     if (!state.playing && source) show(moment.time, true);
   },
   state({ playing, ended, reason, changes }) {
@@ -95,7 +115,7 @@ function open({ facts, blocks, run }) {
   angles = facts.turning ? new Float32Array(disks) : null;
   const each = there => there ? kinds.map(() => []) : null;
   const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), inside: each(facts.isOpen), left: facts.isOpen ? [] : null, entered: facts.isOpen ? [] : null, pressure: [], news: [] };
-  Object.assign(stream, { live: true, ended: false, curves, run, events: { next: [], happened: null } });
+  Object.assign(stream, { live: true, ended: false, curves, run });
   encounter.collisions = [];
   source = fromWorker;
 }
@@ -158,7 +178,12 @@ const fromWorker = {
   counted: () => moment.time === last() ? 'now' : 'an earlier moment',
   curves: () => stream.curves,
   means: () => stream.curves.news[Math.max(0, upTo(stream.curves.time, moment.time) - 1)]?.means,
-  coming: () => stream.live ? stream.events : { next: [], happened: null },
+  // The events to come at each frame belong to this frame. While those of the newest frame are on their way, those of the frame
+  // before are valid if their first event is still to come and the user has changed nothing.
+  coming() {
+    const { coming } = past[moment.frame], { coming: before } = past[moment.frame - 1] ?? {};
+    return coming ?? (!stream.isChanged && before?.next[0]?.[0] > moment.time ? { ...before, happened: null } : NOTHING);
+  },
   hasEvents: () => !film.stepped,
   goesOn: () => isStarting() || !stream.ended || !stream.live,
   setPace(value) {

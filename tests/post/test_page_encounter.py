@@ -231,3 +231,53 @@ def test_nothing_of_the_panel_is_cut(two, size):
     assert two.run(stage) > 0.4 * min(size)
     if size[0] > 700:
         assert two.run(SEEN) == []
+
+
+def test_without_gravity_the_energy_changes_only_at_collisions(two):
+    """Between samples before and after a collision, the curve is no sloped line."""
+    two.run("bounce(0)")
+    wait_for(lambda: two.run("return state.has['contact.restitution']") == "0")
+    one = collide(two)
+    wait_for(lambda: inside(two, "stream.curves.time").count(one["time"]) == 2)
+    two.press("p")
+    wait_for(lambda: inside(two, "moment.time") > one["time"] + 0.3)
+    two.press("p")
+    wait_for(lambda: not inside(two, "state.playing"))
+    curves = inside(two, "stream.curves")
+    for s, mass in enumerate(MASSES):
+        before, after = (mass * np.square(one[name][s]).sum() / 2 for name in ("before", "after"))
+        true = np.where(np.array(curves["time"]) < one["time"], before, after)
+        at = curves["time"].index(one["time"])
+        assert curves["kinetic"][s][at] == pytest.approx(before), "immediately before"
+        np.testing.assert_allclose(np.delete(curves["kinetic"][s], at), np.delete(true, at))
+
+
+def test_events_to_come_are_those_of_the_moment_shown(two):
+    """A step back does not show the events that follow the newest frame."""
+    queue = "filmOf(current()).document.getElementById('queue').textContent"
+    wait_for(lambda: "disk 1 and disk 2" in two.run(f"return {queue}"))
+    first = two.run(f"return {queue}")
+    collide(two)
+    wait_for(lambda: two.run(f"return {queue}") not in ("", first))
+    two.press("\ue011")  # Home
+    wait_for(lambda: inside(two, "moment.time") == 0)
+    assert two.run(f"return {queue}") == first
+
+
+PAINTED = """const canvas = filmOf(current()).document.getElementById('energy');
+    const { width, height } = canvas, copy = document.createElement('canvas');
+    Object.assign(copy, { width, height });
+    const pen = copy.getContext('2d', { willReadFrequently: true });
+    pen.drawImage(canvas, 0, 0);
+    const { data } = pen.getImageData(0, 0, width, height), [r, g, b] = arguments[0];
+    return data.some((_, k) => k % 4 === 0 && data[k + 3] > 99
+      && Math.abs(data[k] - r) + Math.abs(data[k + 1] - g) + Math.abs(data[k + 2] - b) < 12);"""
+
+
+def test_the_energy_is_plotted_from_the_first_moment(two):
+    colour = two.run(
+        "const film = filmOf(current()); return film.speciesColour(film.inside().kinds[1])"
+    )
+    wait_for(lambda: two.run(PAINTED, colour))
+    collide(two)
+    wait_for(lambda: two.run(PAINTED, colour))

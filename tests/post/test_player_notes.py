@@ -1,8 +1,10 @@
 """Names, curves and notes in the player that depend on the system of a run."""
 
+import numpy as np
 import pytest
 
 from ricochet import film_data
+from test_player import BOXES, FEW, LOGGED
 
 
 def test_obstacles_and_walls_have_their_names(simulated):
@@ -47,3 +49,31 @@ def test_recycled_disks_jump_and_no_event_log_would_help(simulated):
     run = simulated(TRACERS + drive)
     facts, _ = film_data.film(run, [0, 1], "speed", [])
     assert facts["note"] == "recycled disks jump between frames"
+
+
+@pytest.mark.parametrize("box", ["walls", "periodic", "container"])
+def test_energies_of_few_disks_without_gravity_are_step_functions(simulated, playing, box):
+    """Curves have their steps at the logged events, however rarely observables are sampled."""
+    text = BOXES[box] + FEW
+    run = simulated(text, *LOGGED, "output.observables_every_time=1")
+    truth = simulated(text, "output.observables_every_events=1", name="many")
+    browser = playing(run.path)
+    curves, is_stepwise = browser.run("return [film.curves, isStepwise()]")
+    assert is_stepwise and len(curves["time"]) > run.event_log().time.size
+    middles = np.convolve(curves["time"], [0.5, 0.5], "valid")
+    for kind, drawn in zip(run.by_species, curves["kinetic"], strict=True):
+        time, energy = truth.observable(f"{kind.name}/kinetic_energy")
+        held = energy[np.searchsorted(time, middles, "right") - 1]
+        np.testing.assert_allclose(drawn[:-1], held, rtol=1e-6)
+    corners = browser.run(
+        """const pen = $('energy').getContext('2d'), { lineTo, moveTo } = pen, lines = [];
+        pen.moveTo = (x, y) => lines.push([[x, y]]);
+        pen.lineTo = (x, y) => (lines.at(-1) ?? lines[lines.push([]) - 1]).push([x, y]);
+        const { time, kinetic: [values] } = film.curves;
+        plotLines($('energy'), [{ time, values, steps: isStepwise() }], Infinity);
+        Object.assign(pen, { lineTo, moveTo });
+        return lines.filter(line => line.length > 2);"""
+    )
+    for line in corners:
+        steps = np.abs(np.diff(line, axis=0))
+        assert np.all(steps.min(axis=1) == 0), "each line is horizontal or vertical"

@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 from ..reading.box import groups_of_rows, passages
 from ..reading.files import RunError
 from ..reading.nature import known, rows_of
-from ..reading.paths import seen, turns_between, why_no_log_tells, why_unknown
+from ..reading.paths import Turns, seen, turns_between, why_no_log_tells, why_unknown
 from ..reading.reader import SIDES, Run
 from ..reading.records import span
 from .drawing import COLOURS, label_of, scale_top
@@ -127,7 +127,9 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
     return found
 
 
-def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
+def told_by_log(
+    run: Run, frames: list[int], most: float
+) -> tuple[dict, dict[str, np.ndarray], Turns | None]:
     """Return collisions per disk up to each frame, and events and paths if the log is not too long.
 
     An event has a time and two partners. A path has the number of velocity changes in each interval
@@ -139,15 +141,16 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
     except RunError:  # a film can be made without an event log
         facts["collisions"] = run.collisions_per_disk_at(run.time)[frames].tolist()
         reason = why_no_log_tells(run) or "output.event_log tells the paths between"
-        return facts | {"note": reason}, {}
+        return facts | {"note": reason}, {}, None
     ends, pairs = seen(run, log, frames), np.append(0, np.cumsum(log.j > 0))
     facts["collisions"] = (2 / run.n_disks * pairs[ends]).tolist()
     some = slice(ends[0], ends[-1])
     if ends[-1] - ends[0] + pairs[ends[-1]] - pairs[ends[0]] > most:
-        return facts | {"note": "too many collisions between"}, {}
+        return facts | {"note": "too many collisions between"}, {}, None
     facts |= {"events": exact, "note": why_unknown(run, log)}
     blocks = {"when": log.time[some].astype("<f8")}
     blocks |= {name: (own[some] - 1).astype("<i4") for name, own in (("i", log.i), ("j", log.j))}
+    turns = None
     if not facts["note"]:
         facts["known"] = True
         turns, time = turns_between(run, log, frames, ends), run.time[frames]
@@ -157,7 +160,7 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
         blocks["turning"] = turns.disk.astype("<u4")
         numbers = np.column_stack([share, turns.velocity])
         blocks["turns"] = numbers.astype("<f8" if exact else "<f4")
-    return facts, blocks
+    return facts, blocks, turns
 
 
 def boundary_names(run: Run, kind: str) -> list[str]:
@@ -235,6 +238,42 @@ def curves(run: Run) -> dict:
     return found
 
 
+def are_steps(run: Run, frames: list[int]) -> bool:
+    """Return whether the kinetic energies are step functions, which the film shows as such."""
+    is_whole = frames[0] == 0 and frames[-1] == run.n_frames - 1
+    return run.n_disks <= FEW_DISKS and is_whole and not run.gravity.any() and run.present is None
+
+
+def energy_steps(run: Run, drawn: dict, turns: Turns) -> dict:
+    """Return the curves with samples at all events, and kinetic energies that change only there.
+
+    Without gravity, the energy of a disk is constant between its collisions. The other curves are
+    interpolated, or keep their last value.
+    """
+    order = np.argsort(turns.disk, kind="stable")  # by disk, and for each disk by time
+    disk, when, after = turns.disk[order], turns.time[order], turns.velocity[order]
+    start, is_first = run.velocity[0], np.diff(disk, prepend=-1) != 0
+    before = np.where(is_first[:, None], start[disk], np.roll(after, 1, axis=0))
+    gain = run.mass[disk] * np.sum(after**2 - before**2, axis=1) / 2
+    time = np.unique(np.concatenate([drawn["time"], when]))
+    time = time[thinned(len(time), MOST_SAMPLES)]
+    found: dict = {"time": time.tolist(), "kinetic": []}
+    for kind in run.by_species:
+        own = kind.disks[disk]
+        by_time = np.argsort(when[own], kind="stable")
+        sums = np.append(0, np.cumsum(gain[own][by_time]))
+        sums += np.sum(run.mass[kind.disks, None] * start[kind.disks] ** 2) / 2
+        past = np.searchsorted(when[own][by_time], time, "right")
+        found["kinetic"].append([float(f"{x:.7g}") for x in sums[past] / kind.disks.sum()])
+    held = np.searchsorted(drawn["time"], time, "right") - 1
+    if drawn["rotational"]:
+        found["rotational"] = [[values[k] for k in held] for values in drawn["rotational"]]
+    if drawn["pressure"]:
+        pressure = np.interp(time, drawn["time"], np.array(drawn["pressure"], dtype=float))
+        found["pressure"] = [float(f"{x:.7g}") if np.isfinite(x) else None for x in pressure]
+    return found
+
+
 def scene(run: Run) -> tuple[dict, dict]:
     """Return the constant data of a film of `run`: box, obstacles, species and disks."""
     radii, own = radii_of(run)
@@ -284,7 +323,10 @@ def film(
 ) -> tuple[dict, dict]:
     """Return the values of a film, and its arrays as bytes."""
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
-    told, blocks = told_by_log(run, frames, room / 2 // TURN)
+    told, blocks, turns = told_by_log(run, frames, room / 2 // TURN)
+    drawn = curves(run)
+    if turns and are_steps(run, frames):
+        drawn |= energy_steps(run, drawn, turns)
     blocks = {name: block.tobytes() for name, block in blocks.items()}
     blocks |= moving(run, frames, tops.get("collisions", 1))
     # Displacements are measured from the positions in the first frame of the film, `origin`,
@@ -296,7 +338,7 @@ def film(
     facts, own = scene(run)
     facts |= {
         "time": run.time[frames].tolist(),
-        "curves": curves(run),
+        "curves": drawn,
         "scales": {name: [label_of(run, name), float(f"{top:.7g}")] for name, top in tops.items()},
         "colour": colour,
         "traced": traced or ([0] if run.n_disks == 1 else []),

@@ -9,7 +9,7 @@ from ..reading.reader import Run
 from ..running.simulation import NEVER, Simulation
 
 MOST_DISKS = 4  # largest number of disks for which collisions are recorded
-MOST_RECORDED = 50  # largest number of collisions recorded between two frames
+MOST_RECORDED = 50  # largest number of events recorded between two frames
 
 
 def are_recorded(run: Run) -> bool:
@@ -24,13 +24,14 @@ def advance_and_record(
     patience: float,
     record: Callable[[dict], None],
 ) -> bool:
-    """Advance for at most `patience` [s], calling `record` for each disk-disk collision.
+    """Advance for at most `patience` [s], calling `record` immediately after each event.
 
     Stopping the engine at each event does not change the result by a single bit. The dictionary
-    passed to `record` holds the time, the indices i and j, the velocities (N, 2) of all disks
-    before and after the collision, and the normal speeds of approach and separation. `limits` are a
-    time, a number of collisions and a number of events; True is returned if none of them is
-    reached. The box must have no periodic sides.
+    passed to `record` holds the time and the velocities (N, 2) of all disks before the event. For a
+    disk-disk collision it also holds the indices i and j, the velocities after the collision, and
+    the normal speeds of approach and separation. `limits` are a time, a number of collisions and a
+    number of events; True is returned if none of them is reached. The box must have no periodic
+    sides.
     """
     deadline, recorded = time.perf_counter() + patience, 0
     end, _, last = limits
@@ -43,9 +44,9 @@ def advance_and_record(
         before = simulation.velocity + gravity * (when - simulation.time)
         if simulation._go_on((np.inf, NEVER, simulation.events + 1), patience):
             return True
-        if j > 0:
-            record(described(simulation, i - 1, j - 1, before))
-            recorded += 1
+        collision = described(simulation, i - 1, j - 1, before) if j > 0 else {}
+        record({"time": simulation.time, "before": before.tolist()} | collision)
+        recorded += 1
     return simulation._go_on(limits, patience)
 
 
@@ -55,9 +56,7 @@ def described(simulation: Simulation, i: int, j: int, before: np.ndarray) -> dic
     normal = (place[j] - place[i]) / np.hypot(*(place[j] - place[i]))
     approach, separation = (float((v[i] - v[j]) @ normal) for v in (before, after))
     return {
-        "time": simulation.time,
         "disks": [i, j],
-        "before": before.tolist(),
         "after": after.tolist(),
         "approach": approach,
         "separation": -separation,

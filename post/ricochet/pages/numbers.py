@@ -98,6 +98,16 @@ def observed(simulation: Simulation) -> dict[str, float]:
     return {name: part[0].item() for name, part in seen} | {"time": simulation.time}
 
 
+def energies(run: Run, value: dict) -> dict[str, list[float] | None]:
+    """Return the mean energies of each species by kind; None for kinds that the run lacks."""
+    found = {
+        kind: [value.get(f"{name}/{kind}_energy", 0.0) for name in run.names]
+        for kind in ("kinetic", "potential", "rotational")
+    }
+    lacking = {"potential": not run.gravity.any(), "rotational": TURNS not in run.disk_data}
+    return found | {kind: None for kind, is_lacking in lacking.items() if is_lacking}
+
+
 def sampled(count: int, value: dict) -> tuple[float, ...]:
     """Return time, energy (of the disks in the box), virial and area at each sample."""
     time, mean, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))

@@ -45,6 +45,7 @@ from .encounters import advance_and_record, are_recorded
 from .numbers import (
     FEW_DISKS,
     TURNS,
+    energies,
     means,
     observed,
     pressure_between,
@@ -89,7 +90,7 @@ class Session:
         self.actions: list[tuple] = []  # changes: time, kind, value as requested, exact value
         self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST_SAMPLES)
         self.last_event: tuple | None = None
-        self.encounters: list[dict] = []  # collisions of a few disks not yet sent to the page
+        self.encounters: list[dict] = []  # events of a few disks not yet sent to the page
         self.goal: tuple[float, int, int] | None = None  # end of a step in progress
         self.made = 0  # number of changes of variables when the scene was last sent
         self.held: dict[int, dict] = {}  # earlier motion of each dragged side, by its index
@@ -358,9 +359,12 @@ class Session:
     def go_on(self, limits: tuple[float, int, int]) -> bool:
         """Advance for at most `SLICE`; return True as long as no limit has been reached."""
         if are_recorded(self.run):
-            record = self.encounters.append
-            return advance_and_record(self.simulation, limits, SLICE, record)
+            return advance_and_record(self.simulation, limits, SLICE, self.record)
         return self.simulation._go_on(limits, SLICE)
+
+    def record(self, event: dict) -> None:
+        """Store an event of a few disks with the energies after it."""
+        self.encounters.append(event | energies(self.run, observed(self.simulation)))
 
     def send_frame(self) -> None:
         """Send a frame."""
@@ -418,14 +422,6 @@ class Session:
         self.numbers_sent = time.perf_counter()
         run, value = self.run, observed(self.simulation)
         now = value["time"]
-        energies = {
-            kind: [value.get(f"{name}/{kind}_energy", 0.0) for name in run.names]
-            for kind in ("kinetic", "potential", "rotational")
-        }
-        if not run.gravity.any():
-            energies["potential"] = None
-        if TURNS not in run.disk_data:
-            energies["rotational"] = None
         if not self.samples or now > self.samples[-1][0]:
             self.samples.append(sample_of(run, value))
         energy = run.n_disks * value["all/kinetic_energy"]
@@ -442,7 +438,7 @@ class Session:
             facts["inside"] = [value[f"{name}/particle_number"] for name in run.names]
             for name, parts in passages(value).items():
                 facts[name] = sum(value[part] for part in parts)
-        send_json({"is": "numbers"} | facts | energies)
+        send_json({"is": "numbers"} | facts | energies(run, value))
 
 
 # --- messages ---
