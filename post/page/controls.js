@@ -1,6 +1,6 @@
 // ---------- settings that the user can change ----------
 
-const state = { playing: false, colour: '', traced: [], arrows: false, sofar: null, total: false, momenta: true, centred: false };
+const state = { playing: false, colour: '', traced: [], arrows: false, sofar: null, total: false, momenta: true, centred: false, foretold: true };
 let pace;          // time of the film per second of real time, at speed 1
 let usual = true;  // whether the pace is determined by the length and the speeds of this film
 
@@ -27,7 +27,7 @@ function prepareFilm() {
   sums = null;
   const alike = s => kinds[s].count >= FEWEST && kinds[s].alike;
   counted = kinds.map((_, s) => s).filter(s => film.speeds.rest || alike(s));
-  $('coming').hidden = !film.events;
+  $('coming').hidden = $('foretelling').hidden = !film.events;
   $('speeds').hidden = !counted.length;
   $('sofar').hidden = film.speeds.rest;
   $('event').hidden = !source.hasEvents();
@@ -82,6 +82,7 @@ function refresh() {
   press({
     sofar: state.sofar, total: state.total, arrows: state.arrows, follow: camera.follow >= 0,
   });
+  $('foretold').checked = state.foretold;
   const speed = 10 ** +$('pace').value;
   const perSecond = short(+(pace * speed).toPrecision(2)), words = `×${+speed.toPrecision(2)} (${perSecond} time unit${perSecond === '1' ? '' : 's'} per second)`;
   $('times').textContent = words;
@@ -299,7 +300,11 @@ function followOrNot() {
 
 function on(id, action) { $(id).addEventListener('click', action); }
 
-const turn = name => () => { state[name] = !state[name]; refresh(); };
+const turn = name => () => {
+  state[name] = !state[name];
+  refresh();
+  if (isPart) parent.chosen(window);
+};
 const actions = {
   play: () => play(!state.playing), first: () => step(0), last: () => { if (live.on) follow(true); else go(last()); }, back, next, event: toEvent,
   clear: () => trace([]), push: () => send({ do: 'push', disk: state.traced[0] }), follow: followOrNot, arrows: turn('arrows'), sofar: turn('sofar'), total: turn('total'),
@@ -323,7 +328,8 @@ function listen() {
   listenEncounter();
   $('full').hidden = !document.fullscreenEnabled;
   onSlide($('scrub'), () => go(first() + $('scrub').value * (last() - first())));
-  onSlide($('pace'), () => { follow(false); refresh(); if (isPart) parent.paced(window); });
+  onSlide($('pace'), () => { follow(false); refresh(); if (isPart) parent.chosen(window); });
+  $('foretold').addEventListener('change', turn('foretold'));
   $('colour').addEventListener('change', () => { state.colour = $('colour').value; refresh(); });
   const stage = $('stage');
   stage.addEventListener('pointerdown', event => {
@@ -352,7 +358,7 @@ function listen() {
   addEventListener('keydown', event => {
     if (event.target.matches('select') || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.target.matches('input') && event.key.startsWith('Arrow')) return;
-    if (!keys[event.key] || (event.key === ' ' && event.target.matches('button'))) return;
+    if (!keys[event.key] || (event.key === ' ' && event.target.matches('button, [type=checkbox]'))) return;
     event.preventDefault();
     pressed(event.key);
   });

@@ -2,9 +2,22 @@
 
 // Functions called by the film of a run with few disks.
 const MOST_DISKS = 4;
-function redefine(name, variable, values) { set(`species.${name}.${variable}`, values.join(',')); }
+function redefine(name, variable, values) {
+  const key = `species.${name}.${variable}`;
+  set(key, values.join(','));
+  state.direct = key;
+}
 function restitution() { return numberOf('contact.restitution'); }
 function bounce(value) { set('contact.restitution', String(value)); }
+
+// Returns a message about two overlapping disks with the numbers that the picture shows. The program numbers the disks of each
+// species, and names the species of only one of them.
+function withDisksOfPicture(text) {
+  const [, x, y, other] = text.match(/^disk 1 at (\S+), (\S+) overlaps disk 1 of "(.+)"$/) ?? [], names = namesOfSpecies();
+  const own = names.findIndex(name => name !== other && [x, y].every((one, k) => numberOf(`species.${name}.position`, k) === +one)), pair = [own, names.indexOf(other)].sort();
+  const isFew = names.every(name => textOf(`species.${name}.position`) && ['', '1'].includes(textOf(`species.${name}.count`)));
+  return other && isFew && pair[0] >= 0 ? `disk ${pair[0] + 1} would overlap disk ${pair[1] + 1}` : text;
+}
 
 const namesOfSpecies = () => [...state.groups.filter(({ kind }) => kind === 'species').map(({ place }) => place.slice(8)),
   ...state.added.filter(([kind]) => kind === 'species').map(([, name]) => name)];

@@ -12,6 +12,7 @@ const state = {
   runs: 0,                   // number of runs so far
   boxes: [],                 // runs { figure, frame, letter, words, run, shown } kept for comparison, and the present one at the end
   paused: false, started: false, note: '',   // whether the films are paused; whether the input has a run; error in the address
+  direct: null,              // the latest change, if it was made in the picture or in a table instead of the form
 };
 // Variables that can be changed while a simulation is running. Changing any other variable starts a new run.
 const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|surface_velocity|velocity|mass|force|open)|source\.\w+\.(count|interval|velocity|temperature|\w+_time))/.test(key);
@@ -38,6 +39,7 @@ function set(key, text) {
   const old = textOf(key);
   delete state.waiting[key];
   state.note = '';
+  state.direct = null;
   delete state.settings[key];  // makes the latest setting the last in the list
   if (text !== givenAs(key)) state.settings[key] = text;
   sync();
@@ -321,19 +323,21 @@ function hear(source, news) {
 function ready() { busy = 0; if (again) run(); }
 
 // Shows each error message once: beside the variable that caused the error or, if the message names no variable, beside the
-// variable that the user changed last. The refused text stays in the form while the variable keeps its old value. All changes
-// without errors take effect.
+// variable that the user changed last. The refused text stays in the form while the variable keeps its old value. A change made in
+// the picture is undone, and the line at the top shows the reason. All changes without errors take effect.
 function showProblems(problems) {
   const changes = () => Object.keys({ ...state.has, ...state.settings }).filter(differs), before = changes();
-  for (const { place, text } of problems) {
-    const key = before.includes(place) ? place : before.at(-1);
+  let undone = null;
+  for (const { place, text: asFile } of problems) {
+    const text = withDisksOfPicture(asFile), key = before.includes(place) ? place : before.at(-1);
     if (!key || !differs(key)) continue;
     const most = mostOf({ key });
-    state.waiting[key] = { text: textOf(key), said: most < numberOf(key) ? `too full: at most ${short(most)}` : text };
+    if (key === state.direct) undone = text;
+    else state.waiting[key] = { text: textOf(key), said: most < numberOf(key) ? `too full: at most ${short(most)}` : text };
     if (key in state.has) state.settings[key] = state.has[key]; else delete state.settings[key];
   }
   sync();
-  tell(before.length ? IMPOSSIBLE : problems[0].text, true);
+  tell(undone ?? (before.length ? IMPOSSIBLE : problems[0].text), true);
   toAddress();
   again ||= before.length > 0 && (changes().length > 0 || !state.started || !current().run);
 }
@@ -490,9 +494,10 @@ function played(source, on) {
 
 function tellPause() { $('pause').textContent = state.paused ? 'Go on' : 'Pause'; }
 
-function paced(source) {
-  const { pace, speed } = source.choices();
-  for (const one of films()) if (one !== source) one.choices({ pace, speed });
+// Gives all films the speed of one film, and whether it shows arrows, the next event, and the centre-of-mass frame.
+function chosen(source) {
+  const { pace, speed, state: { arrows, momenta, centred, foretold } } = source.choices();
+  for (const one of films()) if (one !== source) one.choices({ pace, speed, state: { arrows, momenta, centred, foretold } });
 }
 
 // ---------- scan: measurement of one quantity for five values of an input variable ----------

@@ -451,7 +451,7 @@ const meeting = ([, i, j]) => `disk ${i + 1} and ${j < 0 ? film.surfaces[-1 - j]
 
 function tellQueue() {
   if (!film.events) return;
-  const { next, happened } = source.coming();
+  const { next: known, happened } = source.coming(), next = state.foretold ? known : [];
   $('queue').innerHTML = next.map(one => `<li>${meeting(one)}<span>t = ${long(one[0])}</span></li>`).join('');
   $('due').textContent = next.length ? `the first in ${short(next[0][0] - moment.time)}` : '';
   $('happened').textContent = happened ? `Happened: ${meeting(happened)}.` : ' ';

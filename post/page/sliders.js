@@ -2,7 +2,8 @@
 
 const SLIP = 6;  // a pointer that moves less is a click, not a drag [CSS pixels]
 
-// Calls `act` whenever the user sets a slider. Browsers set a slider as soon as a finger touches it, even if the finger then
+// Calls `act` whenever the user sets a slider. A slider released by mouse or finger loses the focus, so that the next keys control
+// the film; a slider reached with the Tab key keeps it. Browsers set a slider as soon as a finger touches it, even if the finger then
 // scrolls the page. A touch therefore acts only when the finger moves along the slider or is lifted; if the page is scrolled, the
 // slider returns to its earlier value.
 function onSlide(slider, act) {
@@ -20,5 +21,11 @@ function onSlide(slider, act) {
   slider.addEventListener('input', () => {
     if (!touch) act();
     else if (touch.scrolls) slider.value = touch.value;
+  });
+  let isHeld = false;
+  slider.addEventListener('pointerdown', () => { isHeld = true; });
+  for (const end of ['pointerup', 'pointercancel', 'change']) slider.addEventListener(end, () => {
+    if (isHeld) slider.blur();
+    isHeld &&= end === 'change';
   });
 }

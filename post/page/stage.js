@@ -259,7 +259,7 @@ function drawMarks() {
   inBox(marks, () => {
     if (angles) drawRadii();
     if (!isCentred()) state.traced.forEach(drawTrace);
-    if (film.events && !isCentred()) drawNextEvent();
+    if (film.events && state.foretold && !isCentred()) drawNextEvent();
     if (isEncounter() && state.momenta) drawMomenta();
     if (state.arrows) drawArrows();
     if (film.exact) drawNumbers();
@@ -298,9 +298,9 @@ function drawTrace(i) {
   ring(X[i], Y[i], Math.max(radii[sizeOf[i]], 3 * page.dots) + 2 * page.dots);
 }
 
-// Draws the free flights of the disks that take part in the next event, and their positions at the event.
+// Draws the free flights of the disks that take part in the next event, and their positions at the event, labelled with its time.
 function drawNextEvent() {
-  const [when, ...both] = source.coming().next[0] ?? [], after = when - moment.time, g = film.gravity;
+  const [when, ...both] = source.coming().next[0] ?? [], places = [], after = when - moment.time, g = film.gravity;
   marks.strokeStyle = ink.accent;
   for (const i of both.filter(k => k >= 0)) {
     const from = [X[i], Y[i]], to = [VX[i], VY[i]].map((v, k) => from[k] + (v + 0.5 * g[k] * after) * after);
@@ -308,7 +308,17 @@ function drawNextEvent() {
     marks.setLineDash([5 * page.dots, 4 * page.dots]);
     ring(...to, radii[sizeOf[i]]);
     marks.setLineDash([]);
+    places.push([across(to[0]), up(to[1]), radii[sizeOf[i]]]);
   }
+  if (places.length && film.exact) labelEvent(`next event: t = ${short(when)}`, places.sort(([, one], [, other]) => one - other));
+}
+
+// Writes a label above the upper of the marked disks or, if there is no room, below the lower.
+function labelEvent(words, places) {
+  const size = 12 * page.dots, [x, y, r] = places[0], [, low, wide] = places.at(-1), isAbove = y - r > 2.5 * size;
+  Object.assign(marks, { font: `${size}px system-ui, sans-serif`, fillStyle: ink.accent, textAlign: 'center', textBaseline: 'middle' });
+  const half = marks.measureText(words).width / 2 + 4 * page.dots;
+  marks.fillText(words, clamp(x, half, page.width - half), isAbove ? y - r - size : low + wide + size);
 }
 
 function ring(x, y, radius) {

@@ -281,8 +281,8 @@ function choices(wish) {
     Object.assign(encounter, wish.scale);
     if (film) refresh();
   }
-  const { colour, arrows, sofar, total, momenta, centred } = state, { input, speed, mass } = encounter;
-  return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total, momenta, centred }, scale: { input, speed, mass } };
+  const { colour, arrows, sofar, total, momenta, centred, foretold } = state, { input, speed, mass } = encounter;
+  return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total, momenta, centred, foretold }, scale: { input, speed, mass } };
 }
 
 // Plays this film again from its first stored frame when another run starts beside it.

@@ -281,3 +281,60 @@ def test_the_energy_is_plotted_from_the_first_moment(two):
     wait_for(lambda: two.run(PAINTED, colour))
     collide(two)
     wait_for(lambda: two.run(PAINTED, colour))
+
+
+def test_a_disk_dropped_on_another_returns_and_the_message_names_both(two):
+    """The disks have the numbers of the picture; no slider of the form shows the message."""
+    start, other = pixel(two, 0.25, 0.53), pixel(two, 0.75, 0.47)
+    grip = [start[0] - 10, start[1] + 5]
+    mouse(two, grip, [grip[0], grip[1] + 40], [other[0] - 10, other[1] + 5])
+    wait_for(lambda: two.run("return $('status').textContent") == "disk 1 would overlap disk 2")
+    assert two.run("return [state.settings, state.waiting]") == [{}, {}]
+    wait_for(lambda: inside(two, "moment.time") == 0)
+    said = "return [...document.querySelectorAll('#form .problem')].map(one => one.textContent)"
+    assert "".join(two.run(said)) == ""
+    drop = two.run("return filmOf(current()).pixelOf(0.25, 0.53)")
+    assert two.run("return filmOf(current()).diskAt(...arguments[0], 0)", drop) == 0
+
+
+LABELS = """const film = filmOf(current()), marks = film.document.getElementById('marks').getContext('2d');
+    const words = [];
+    marks.fillText = text => { words.push(String(text)); };
+    film.drawStage();
+    delete marks.fillText;
+    film.drawStage();
+    return words;"""
+
+
+def test_keys_control_the_film_after_a_slider_is_released(two):
+    """A slider reached with the Tab key keeps the keys that move it."""
+    middle = """const one = document.querySelectorAll('.slider [type=range]')[arguments[0]];
+        const { x, y, width, height } = one.getBoundingClientRect();
+        return [x + width / 2, y + height / 2];"""
+    x, y = two.run(middle, 2)
+    rerun(two, lambda: mouse(two, [x, y], [x + 10, y], [x + 20, y]))
+    settings, run = two.run("return [state.settings, current().run]")
+    assert list(settings) == ["species.disk2.mass"]
+    collide(two)
+    for key, condition in (("\ue011", "=== 0"), ("\ue014", "> 0")):  # Home, right
+        two.press(key)
+        two.until(f"return filmOf(current()).inside().moment.time {condition}")
+    assert two.run("return [state.settings, current().run]") == [settings, run]
+    two.run("document.querySelectorAll('.slider [type=range]')[2].focus()")
+    rerun(two, lambda: two.press("\ue014"))
+    assert two.run("return state.settings") != settings
+
+
+def test_the_next_event_is_labelled_and_can_be_hidden(two):
+    """A teacher who asks for a prediction hides it in the picture and in the list."""
+    wait_for(lambda: "next event: t = 0.5658" in two.run(LABELS))
+    queue = "return filmOf(current()).document.getElementById('queue').childElementCount"
+    assert two.run(queue) > 0
+    two.run(CLICK, "foretold")
+    assert not any("next event" in text for text in two.run(LABELS))
+    assert two.run(queue) == 0
+    two.press("c")  # the next run beside this one hides it, too
+    wait_for(lambda: two.run("return state.boxes.length === 2 && !busy && current().run > 1"))
+    wait_for(lambda: two.run("return films().every(one => !one.inside().state.foretold)"))
+    two.run(CLICK, "foretold")
+    wait_for(lambda: two.run("return films().every(one => one.inside().state.foretold)"))
