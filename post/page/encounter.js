@@ -86,22 +86,27 @@ function redefine(i, variable, values) {
   else send({ do: 'aim', disk: i, velocity: values });
 }
 
-function drawArrow(x, y, dx, dy, width, colour) {
-  const size = Math.hypot(dx, dy), head = Math.min(3 * width + 3 * page.dots, 0.6 * size);
+// Draws a thick arrow with a dark rim, which makes it visible on a disk of the same colour.
+function drawArrow(x, y, dx, dy, colour) {
+  const size = Math.hypot(dx, dy), half = 3 * page.dots, head = Math.min(7 * half, 0.6 * size), neck = size - head;
   if (size < 1) return;
-  const [ex, ey] = [dx / size, dy / size], [bx, by] = [x + dx - head * ex, y + dy - head * ey];
-  Object.assign(marks, { strokeStyle: colour, fillStyle: colour, lineWidth: width, lineCap: 'butt' });
-  marks.stroke(new Path2D(`M${x},${y}L${bx},${by}`));
-  marks.fill(new Path2D(`M${x + dx},${y + dy}L${bx - head / 2 * ey},${by + head / 2 * ex}L${bx + head / 2 * ey},${by - head / 2 * ex}Z`));
+  const corners = [[0, -half], [neck, -half], [neck, -head / 2], [size, 0], [neck, head / 2], [neck, half], [0, half]];
+  const path = new Path2D(`M${corners.map(([a, b]) => [x + (a * dx - b * dy) / size, y + (a * dy + b * dx) / size]).join('L')}Z`);
+  Object.assign(marks, { strokeStyle: ink.ink, fillStyle: colour, lineWidth: page.dots, lineJoin: 'miter' });
+  marks.fill(path);
+  marks.stroke(path);
 }
 
-// Draws momenta as thick arrows below the velocity arrows, and the centre of mass with the total momentum.
+// Returns the length of the arrow of a momentum of 1 [pixels].
+const momentumScale = () => arrowScale() / encounter.mass;
+
+// Draws momenta as thick arrows in the colours of the disks, below the velocity arrows, and the centre of mass with the total momentum.
 function drawMomenta() {
-  const [ux, uy] = frameVelocity(), length = arrowScale() / encounter.mass, all = totals(), width = 6 * page.dots;
-  marks.globalAlpha = 0.6;
-  film.masses.forEach((mass, i) => drawArrow(across(X[i]), up(Y[i]), mass * (VX[i] - ux) * length, -mass * (VY[i] - uy) * length, width, ink.hot));
+  const [ux, uy] = frameVelocity(), length = momentumScale(), all = totals();
+  marks.globalAlpha = 0.75;
+  film.masses.forEach((mass, i) => drawArrow(across(X[i]), up(Y[i]), mass * (VX[i] - ux) * length, -mass * (VY[i] - uy) * length, css(speciesColour(kinds[speciesOf[i]]))));
   const [x, y, r] = [across(all.x), up(all.y), 5 * page.dots];
-  drawArrow(x, y, (all.px - all.mass * ux) * length, -(all.py - all.mass * uy) * length, width, ink.soft);
+  drawArrow(x, y, (all.px - all.mass * ux) * length, -(all.py - all.mass * uy) * length, ink.soft);
   marks.globalAlpha = 1;
   Object.assign(marks, { strokeStyle: ink.ink, lineWidth: 1.5 * page.dots });
   marks.stroke(new Path2D(`M${x - 2 * r},${y}L${x + 2 * r},${y}M${x},${y - 2 * r}L${x},${y + 2 * r}`));
@@ -136,7 +141,7 @@ function buildBodies() {
   $('more').disabled = disks >= 4;
   if (encounter.rows === rows) return;
   encounter.rows = rows;
-  $('bodies').innerHTML = cellsOf(['disk', 'mass', 'v<sub>x</sub>', 'v<sub>y</sub>', 'p<sub>x</sub>', 'p<sub>y</sub>', 'energy'], 'th')
+  $('bodies').innerHTML = cellsOf(HEADS, 'th')
     + names.map((_, i) => cellsOf([i + 1, ...Array(6).fill('')], 'td')).join('') + cellsOf(['all', ...Array(6).fill('')], 'td');
   names.forEach((name, i) => ['mass', 'velocity along x', 'velocity along y'].forEach((words, k) => {
     const field = Object.assign(document.createElement('input'), { inputMode: 'decimal', ariaLabel: `${words} of disk ${i + 1}`, disabled: k === 0 && typeof name !== 'string' });
@@ -156,47 +161,90 @@ function enter(i, k, field) {
   else redefine(i, 'velocity', k === 1 ? [value, ofFrame(VY[i])] : [ofFrame(VX[i]), value]);
 }
 
-function tellEncounter() {
-  if (!isEncounter()) return;
-  const [ux, uy] = frameVelocity(), all = totals(), p = encounter.mass * encounter.speed, e = p * encounter.speed, { speed } = encounter;
+// Returns mass, velocity, momentum and energy of each disk and of all disks, relative to the centre of mass or to the box.
+function motionNow(centred) {
+  const all = totals(), [ux, uy] = centred ? [all.vx, all.vy] : [0, 0];
   const rows = film.masses.map((mass, i) => [mass, VX[i] - ux, VY[i] - uy, mass * (VX[i] - ux), mass * (VY[i] - uy), mass * ((VX[i] - ux) ** 2 + (VY[i] - uy) ** 2) / 2]);
   const frame = all.mass * (ux * ux + uy * uy) / 2;  // energy due to the motion of the frame of reference
   rows.push([all.mass, all.vx - ux, all.vy - uy, all.px - all.mass * ux, all.py - all.mass * uy, all.energy - frame]);
-  const scales = [1e-9, speed, speed, p, p, e], aims = canAim();
-  rows.forEach((row, i) => row.forEach((value, k) => {
-    const cell = $('bodies').rows[i + 1].cells[k + 1], field = cell.firstElementChild, text = k ? alike(value, scales[k]) : exactly(value, scales[k], 4);
+  return rows;
+}
+
+// Returns the numbers of a table of `motionNow` as texts.
+function motionInWords(rows) {
+  const { mass, speed } = encounter, p = mass * speed, scales = [1e-9, speed, speed, p, p, p * speed];
+  return rows.map(row => row.map((value, k) => k ? alike(value, scales[k]) : exactly(value, scales[k], 4)));
+}
+
+const HEADS = ['disk', 'mass', 'v<sub>x</sub>', 'v<sub>y</sub>', 'p<sub>x</sub>', 'p<sub>y</sub>', 'energy'];
+
+// Shows the same tables for each compared run, beside those of this run.
+function tellOthers() {
+  const others = overlaid.filter(({ motion }) => motion), own = parent.letterOf?.(window);
+  $('others').hidden = !others.length;
+  $('letter').textContent = others.length ? ` of run ${own}` : '';
+  $('others').innerHTML = others.map(({ letter, motion }) => {
+    const { rows, collision } = motion(state.centred), words = motionInWords(rows);
+    const table = words.map((row, i) => cellsOf([i < words.length - 1 ? i + 1 : 'all', ...row], 'td')).join('');
+    return `<div><h2>Run ${letter}</h2><table class="bodies">${cellsOf(HEADS, 'th')}${table}</table>
+      <p>${collisionInWords(collision)}</p><table>${collision ? balanceOf(collision) : ''}</table></div>`;
+  }).join('');
+}
+
+// Called by the page of a compared run.
+function motionOfFilm(centred) { return { rows: motionNow(centred), collision: lastCollision(centred) }; }
+
+function tellEncounter() {
+  if (!isEncounter()) return;
+  const aims = canAim();
+  motionInWords(motionNow(state.centred)).forEach((row, i) => row.forEach((text, k) => {
+    const cell = $('bodies').rows[i + 1].cells[k + 1], field = cell.firstElementChild;
     if (!field) cell.textContent = text;
     else {
       if (k) field.readOnly = !aims;
       if (field.ownerDocument.activeElement !== field && !field.matches('.wrong')) field.value = text;
     }
   }));
+  $('frame').textContent = state.centred ? ', centre-of-mass frame' : '';
   const bounce = parent.restitution();
   if (document.activeElement !== $('bounce')) $('bounce').value = bounce;
   $('restitution').textContent = `restitution ${short(bounce)}`;
   $('bounce').setAttribute('aria-valuetext', `${short(bounce)}, from 0 to 1`);
   press({ momenta: state.momenta, centred: state.centred, elastic: bounce === 1, inelastic: bounce === 0 });
-  tellLastCollision(p, e);
+  tellLastCollision();
+  tellOthers();
   drawPolygon();
 }
 
-// Compares momentum, energy and relative velocity before and after the last collision up to the time shown.
-function tellLastCollision(p, e) {
+// Returns the last collision of two disks up to the time shown, with total momentum and energy before and after it.
+function lastCollision(centred) {
   const { collisions } = encounter, one = collisions[upTo(collisions, moment.time, ({ time }) => time) - 1];
-  $('balance').hidden = !one;
-  $('when').textContent = one ? `Last collision: disks ${one.disks[0] + 1} and ${one.disks[1] + 1}, at t = ${long(+one.time.toPrecision(5))}.` : 'No collision yet.';
-  if (!one) return;
+  if (!one) return null;
   const [before, after] = [one.before, one.after].map(list => {
-    const sum = totals(i => list[i]), m = state.centred ? sum.mass : 0;
+    const sum = totals(i => list[i]), m = centred ? sum.mass : 0;
     return { px: sum.px - m * sum.vx, py: sum.py - m * sum.vy, energy: sum.energy - m * (sum.vx ** 2 + sum.vy ** 2) / 2 };
   });
-  const share = 1 - after.energy / before.energy, isLost = share > NO_SPEED, lost = isLost ? ` (${short(+(100 * share).toPrecision(3))} % lost)` : '';
+  return { ...one, before, after };
+}
+
+const collisionInWords = one => one ? `Last collision: disks ${one.disks[0] + 1} and ${one.disks[1] + 1}, at t = ${long(+one.time.toPrecision(5))}.` : 'No collision of two disks yet.';
+
+// Compares momentum, energy and relative velocity before and after the last collision up to the time shown.
+function tellLastCollision() {
+  const one = lastCollision(state.centred);
+  $('balance').hidden = !one;
+  $('when').textContent = collisionInWords(one);
+  if (one) $('balance').innerHTML = balanceOf(one);
+}
+
+function balanceOf({ before, after, approach, separation }) {
+  const { mass, speed } = encounter, p = mass * speed, e = p * speed, share = 1 - after.energy / before.energy, isLost = share > NO_SPEED, lost = isLost ? ` (${short(+(100 * share).toPrecision(3))} % lost)` : '';
   const rows = [
     ['momentum', ...[before, after].map(({ px, py }) => `(${exactly(px, p)}, ${exactly(py, p)})`)],
     ['kinetic energy', exactly(before.energy, e), exactly((isLost ? after : before).energy, e) + lost],
-    ['speed of approach, separation', exactly(one.approach, encounter.speed), `${exactly(one.separation, encounter.speed)} (ratio ${exactly(one.separation / one.approach, 1)})`],
+    ['speed of approach, separation', exactly(approach, speed), `${exactly(separation, speed)} (ratio ${exactly(separation / approach, 1)})`],
   ];
-  $('balance').innerHTML = cellsOf(['', 'before', 'after'], 'th') + rows.map(row => cellsOf(row, 'td')).join('');
+  return cellsOf(['', 'before', 'after'], 'th') + rows.map(row => cellsOf(row, 'td')).join('');
 }
 
 // Draws the momenta one after another, tip to tail, and their sum.

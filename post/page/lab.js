@@ -442,8 +442,8 @@ function overlayAll() {
   if (!box || !isThere(box)) return;
   const others = shownBoxes().filter(one => one !== box && isThere(one) && one.run);
   filmOf(box).overlay(others.map(({ letter, frame }) => {
-    const { stream, kinds, numbersNow, speedsOfFilm } = frame.contentWindow.inside();
-    return { letter, kinds, curves: stream.curves, numbers: numbersNow, speeds: speedsOfFilm };
+    const { stream, kinds, numbersNow, speedsOfFilm, motion } = frame.contentWindow.inside();
+    return { letter, kinds, curves: stream.curves, numbers: numbersNow, speeds: speedsOfFilm, motion };
   }));
 }
 function letterOf(source) { return state.boxes.find(box => filmOf(box) === source)?.letter; }

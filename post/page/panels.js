@@ -371,6 +371,7 @@ function layTableOut() {
 }
 
 function tellEnergies() {
+  $('laboratory').hidden = !isCentred();  // momenta and velocities above are relative to the centre of mass
   kinds.forEach((_, s) => there().forEach((name, k) => {
     const now = name === 'rotational' ? lastOf(name, s) : moment[name][s];
     $('energies').rows[s + 1].cells[2 + k].textContent = now === null ? '' : short(now * share(s));

@@ -265,7 +265,7 @@ function drawMarks() {
     if (film.exact) drawNumbers();
     drawHandles();
   });
-  if (state.arrows) drawArrowKey();
+  drawArrowKeys();
 }
 
 // Draws the orientation of each disk as a line from its centre to its rim, except in small disks.
@@ -377,16 +377,25 @@ function drawArrows() {
   }
 }
 
-// Draws a reference arrow in the upper left corner, labelled with the speed that it represents.
-function drawArrowKey() {
-  const speed = +arrowSpeed().toPrecision(1), size = speed * arrowScale(), { dots } = page, words = `speed ${short(speed)}`;
-  marks.font = `${12 * dots}px system-ui, sans-serif`;
-  Object.assign(marks, { textAlign: 'left', textBaseline: 'middle', fillStyle: ink.card, globalAlpha: 0.85 });
-  marks.fillRect(6 * dots, 6 * dots, size + marks.measureText(words).width + 22 * dots, 22 * dots);
-  Object.assign(marks, { globalAlpha: 1, fillStyle: ink.ink, strokeStyle: ink.ink, lineWidth: 1.4 * dots });
-  const [x, y, head] = [12 * dots + size, 17 * dots, Math.min(6 * dots, 0.5 * size)];
-  marks.stroke(new Path2D(`M${12 * dots},${y}L${x},${y}M${x - head},${y - head / 2}L${x},${y}L${x - head},${y + head / 2}`));
-  marks.fillText(words, x + 6 * dots, y);
+// Draws reference arrows in the upper left corner, labelled with the speed and the momentum that they represent.
+function drawArrowKeys() {
+  const { dots } = page, thin = (x, y, size) => {
+    const end = x + size, head = Math.min(6 * dots, 0.5 * size);
+    Object.assign(marks, { strokeStyle: ink.ink, lineWidth: 1.4 * dots });
+    marks.stroke(new Path2D(`M${x},${y}L${end},${y}M${end - head},${y - head / 2}L${end},${y}L${end - head},${y + head / 2}`));
+  };
+  const keys = state.arrows ? [['speed', arrowSpeed(), arrowScale(), thin]] : [];
+  if (isEncounter() && state.momenta) keys.push(['momentum', arrowSpeed() * encounter.mass, momentumScale(), (x, y, size) => drawArrow(x, y, size, 0, ink.soft)]);
+  keys.forEach(([name, typical, scale, draw], k) => {
+    const value = +typical.toPrecision(1), size = value * scale, words = `${name} ${short(value)}`, y = (17 + 22 * k) * dots;
+    marks.font = `${12 * dots}px system-ui, sans-serif`;
+    Object.assign(marks, { textAlign: 'left', textBaseline: 'middle', fillStyle: ink.card, globalAlpha: 0.85 });
+    marks.fillRect(6 * dots, y - 11 * dots, size + marks.measureText(words).width + 22 * dots, 22 * dots);
+    marks.globalAlpha = 1;
+    draw(12 * dots, y, size);
+    marks.fillStyle = ink.ink;
+    marks.fillText(words, 18 * dots + size, y);
+  });
 }
 
 // Draws the number of each disk inside it or, if it is too small, beside it.

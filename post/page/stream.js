@@ -229,7 +229,7 @@ const fromWorker = {
 // ---------- film as a part of the laboratory ----------
 
 // Called by the laboratory for each of its films.
-function inside() { return { film, source, state, moment, kinds, stream, overlaid, past, encounter, numbersNow, speedsOfFilm }; }
+function inside() { return { film, source, state, moment, kinds, stream, overlaid, past, encounter, numbersNow, speedsOfFilm, motion: isEncounter() ? motionOfFilm : null }; }
 
 // Converts a position in the box to a position on the page [CSS pixels].
 function pixelOf(x, y) { return [across(x) / page.dots, up(y) / page.dots]; }
@@ -285,13 +285,13 @@ function choices(wish) {
   return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total, momenta, centred, foretold }, scale: { input, speed, mass } };
 }
 
-// Plays this film again from its first stored frame when another run starts beside it.
+// Shows this film again from its first stored frame when another run starts beside it; a paused film waits there.
 function replay() {
   if (!film) return;
   show(first(), true);
   stream.live = false;
   send({ do: 'pause' });
-  play(true);
+  play(!parent.isPaused());
 }
 
 // Shows the film beside others: `size` is the size of its picture, at the given distance from the left edge of the page.

@@ -297,8 +297,8 @@ def test_a_disk_dropped_on_another_returns_and_the_message_names_both(two):
     assert two.run("return filmOf(current()).diskAt(...arguments[0], 0)", drop) == 0
 
 
-LABELS = """const film = filmOf(current()), marks = film.document.getElementById('marks').getContext('2d');
-    const words = [];
+LABELS = """const film = filmOf(current()), words = [];
+    const marks = film.document.getElementById('marks').getContext('2d');
     marks.fillText = text => { words.push(String(text)); };
     film.drawStage();
     delete marks.fillText;
@@ -338,3 +338,54 @@ def test_the_next_event_is_labelled_and_can_be_hidden(two):
     wait_for(lambda: two.run("return films().every(one => !one.inside().state.foretold)"))
     two.run(CLICK, "foretold")
     wait_for(lambda: two.run("return films().every(one => one.inside().state.foretold)"))
+
+
+def test_the_energies_of_both_tables_name_their_frame_of_reference(two):
+    text = "return filmOf(current()).document.querySelector(arguments[0]).innerText"
+    plain = [two.run(text, f"section:has(#{name}) h2") for name in ("bodies", "energies")]
+    assert plain == ["Momentum and energy", "Energy"]
+    two.run(CLICK, "centred")
+    wait_for(lambda: inside(two, "state.centred"))
+    found = [two.run(text, f"section:has(#{name}) h2") for name in ("bodies", "energies")]
+    assert found == ["Momentum and energy, centre-of-mass frame", "Energy, frame of the box"]
+
+
+def test_momenta_have_the_colours_of_their_disks_and_a_scale(two):
+    drawn = """const film = filmOf(current()), colours = [];
+        const marks = film.document.getElementById('marks').getContext('2d');
+        marks.fill = path => { if (path) colours.push(marks.fillStyle); };
+        film.drawMomenta();
+        delete marks.fill;
+        film.drawStage();
+        const { kinds } = film.inside(), probe = document.createElement('canvas').getContext('2d');
+        const own = kinds.map(kind => {
+          probe.fillStyle = `rgb(${film.speciesColour(kind)})`;
+          return probe.fillStyle;
+        });
+        return [colours, own];"""
+    colours, own = two.run(drawn)
+    assert colours[:2] == own and len(set(own)) == 2
+    two.until(f"const words = (() => {{ {LABELS} }})(); return words.includes('momentum 1')")
+    assert "speed 0.8" in two.run(LABELS)
+    two.run(CLICK, "momenta")
+    wait_for(lambda: not any("momentum" in text for text in two.run(LABELS)))
+
+
+def test_compared_collisions_have_their_tables_side_by_side_at_one_time(two):
+    two.press("c")
+    two.until("return state.boxes.length === 2 && !busy && current().run === state.runs")
+    two.until("return !!filmOf(current()).inside?.().film?.masses")
+    two.run("bounce(0)")
+    two.until("return current().changes.length === 1")
+    assert collide(two)["separation"] == pytest.approx(0, abs=1e-12)
+    at_once = "const [a, b] = films().map(one => one.inside().moment.time); return a === b && a > 0"
+    two.until(at_once)
+    two.run("overlayAll()")
+    texts = """const { document } = filmOf(current()), other = document.querySelector('#others > div');
+        return [other, document.querySelector('.own')].map(part => [
+          part.querySelector('h2').innerText, part.getBoundingClientRect().top,
+          [...part.querySelectorAll('table')].at(-1).rows[3].cells[2].textContent]);"""
+    two.until(f"const [[,, words]] = (() => {{ {texts} }})(); return words.includes('ratio 1')")
+    (first, top, _), (second, beside, speeds) = two.run(texts)
+    assert (first, second) == ("Run A", "Momentum and energy of run B")
+    assert top == beside and speeds.endswith("(ratio 0)")
