@@ -130,8 +130,9 @@ function drawHandles() {
 // ---------- the panel ----------
 
 const exactly = (value, scale, digits = 6) => Math.abs(value) < NO_SPEED * scale ? '0' : String(+value.toPrecision(digits)).replace('-', '−');
-// Shows 4 digits of the largest value, and thus the same number of decimals in each row of a column.
-const alike = (value, scale) => exactly(+value.toFixed(Math.min(Math.max(3 - Math.floor(Math.log10(scale)), 0), 20)), scale);
+// Shows 4 digits of the largest value, or 3 in a narrow table, and thus the same number of decimals in each row of a column.
+const digitsShown = () => $('bodies').clientWidth < 28 * parseFloat(getComputedStyle($('bodies')).fontSize) ? 3 : 4;
+const alike = (value, scale, digits) => exactly(+value.toFixed(Math.min(Math.max(digits - 1 - Math.floor(Math.log10(scale)), 0), 20)), scale);
 const cellsOf = (row, tag) => `<tr>${row.map(one => `<${tag}>${one}</${tag}>`).join('')}</tr>`;
 
 // Makes a row with fields for mass and velocity for each disk, unless the rows for these disks exist.
@@ -172,8 +173,8 @@ function motionNow(centred) {
 
 // Returns the numbers of a table of `motionNow` as texts.
 function motionInWords(rows) {
-  const { mass, speed } = encounter, p = mass * speed, scales = [1e-9, speed, speed, p, p, p * speed];
-  return rows.map(row => row.map((value, k) => k ? alike(value, scales[k]) : exactly(value, scales[k], 4)));
+  const { mass, speed } = encounter, p = mass * speed, scales = [1e-9, speed, speed, p, p, p * speed], digits = digitsShown();
+  return rows.map(row => row.map((value, k) => k ? alike(value, scales[k], digits) : exactly(value, scales[k], 4)));
 }
 
 const HEADS = ['disk', 'mass', 'v<sub>x</sub>', 'v<sub>y</sub>', 'p<sub>x</sub>', 'p<sub>y</sub>', 'energy'];

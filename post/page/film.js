@@ -205,7 +205,7 @@ function loadFilm({ facts, blocks }) {
 }
 
 const fromFile = {
-  counted: () => `frame ${moment.frame + 1}/${past.length}`,
+  counted: () => film.known ? '' : `frame ${moment.frame + 1}/${past.length}`,  // between frames the disks move along their paths
   curves: () => film.curves,
   coming() {
     const { when, i, j } = events, next = upTo(when, moment.time), one = k => [when[k], i[k], j[k]];

@@ -49,16 +49,6 @@ function set(key, text) {
 const wish = () => ({ input: state.input.name, added: state.added, settings: { ...state.settings } });
 const differs = key => (state.settings[key] ?? givenAs(key)) !== (state.has[key] ?? givenAs(key));
 
-// Returns a variable and its value as text, with the label of its slider or else its name.
-function inWords([key, value]) {
-  if (/^side\.\w+\.open$/.test(key)) return doorInWords(key, value);
-  const slider = state.input.sliders.find(one => one.key === key);
-  return `${slider ? slider.words.replace(/ \(.*/, '') : key} = ${slider?.at >= 0 ? split(value)[slider.at] : value}`;
-}
-
-const settingsInWords = () => Object.entries(wish().settings).map(inWords).join(' · ') || 'as in the file';
-const changeInWords = ([, key, value]) => key ? inWords([key, value]) : value;  // a change without a variable is already in words
-
 // ---------- sliders ----------
 
 // A slider is described by [variable or variable[component], label, smallest value, largest value, 'log' for a logarithmic
@@ -101,7 +91,7 @@ function buildSlider(spec) {
   const { key, at } = spec, id = 'slide.' + key + at;
   const range = make('input', { type: 'range', min: 0, id }), field = make('input', { inputMode: 'text', spellcheck: false });
   const row = make('div', { className: 'slider' }, make('label', { htmlFor: id, textContent: spec.words }),
-    make('small', { textContent: acts(key) ? 'at once' : 'new run' }), make('div', {}, range, field), make('p', { className: 'problem' }));
+    make('small'), make('div', {}, range, field), make('p', { className: 'problem' }));
   field.setAttribute('aria-label', `${spec.words}: value`);
   let values;
   onSlide(range, () => set(key, textWith(spec, String(values[range.value]))));
@@ -114,6 +104,7 @@ function buildSlider(spec) {
       range.value = (values.findIndex(one => one >= value) + values.length) % values.length;
     }
     if (document.activeElement !== field) field.value = at < 0 ? text : split(text)[at] ?? '';
+    row.children[1].textContent = [acts(key) ? 'at once' : 'new run', inheritedInWords(key)].filter(Boolean).join('; ');
     range.setAttribute('aria-valuetext', `${short(value)}, from ${short(values[0])} to ${short(values.at(-1))}`);
     mark(row, key);
   };

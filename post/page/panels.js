@@ -7,14 +7,19 @@ const safe = text => text.replace(/[&<]/g, sign => `&#${sign.charCodeAt(0)};`);
 
 const long = value => String(+value.toPrecision(8)).replace('-', '−');
 
+const numbered = (value, noun) => `${short(value)} ${noun}${value === 1 ? '' : 's'}`;
+
 function tell() {
   const { time, collisions } = moment;
   const share = (time - first()) / (last() - first() || 1);
   $('scrub').value = share;
   markChanges();
   $('scrub').setAttribute('aria-valuetext', `time ${short(time)} of ${short(last())}`);
-  $('clock').innerHTML = `t = <b>${long(+moment.shown.toPrecision(5))}</b><span class="counted"> · ${source.counted()}</span>`
-    + (film.isOpen ? `<span> · ${sumOf(moment.inside)} disks inside</span>` : disks > 1 ? `<span> · ${short(+collisions.toPrecision(3))} collisions per disk</span>` : '');
+  const letter = isPart && parent.isComparing() ? `${parent.letterOf(window)}: ` : '', counted = source.counted();
+  const count = film.isOpen ? `${sumOf(moment.inside)} disks inside` : disks > 1 ? `${numbered(+collisions.toPrecision(3), 'collision')} per disk` : '';
+  const ended = text => text + (count && ' · ');  // films beside others show only the last part, because all have the same time
+  $('clock').innerHTML = `<span class="time">t = <b>${long(+moment.shown.toPrecision(5))}</b>${counted ? ' · ' : ended('')}</span>`
+    + `<span class="counted">${counted && ended(counted)}</span><span>${count && letter + count}</span>`;
   $('traced').hidden = !state.traced.length;
   $('hint').textContent = state.traced.length ? '' : hint();
   $('push').hidden = !isPart || state.traced.length !== 1 || !isInside(state.traced[0]);
@@ -344,8 +349,9 @@ function drawPressure() {
   if (pressure?.some(one => one !== null)) lines.push({ time, values: pressure, colour: colourOf() });
   $('pressures').hidden = !lines.length;
   if (lines.length) plotLines($('pressure'), lines, overlaid.length ? Infinity : moment.time);
-  const now = pressure && lastOf('pressure');
-  $('force').textContent = now === null || now === undefined ? '' : short(now);
+  const now = pressure && lastOf('pressure'), before = ({ letter, curves: { time: times, pressure: values } }) => [letter, values[Math.max(0, upTo(times, moment.time) - 1)]];
+  const known = [...overlaid.filter(({ curves }) => curves.pressure && !falls).map(before), [parent.letterOf?.(window), now]].filter(([, value]) => typeof value === 'number');
+  $('force').textContent = known.map(([letter, value]) => overlaid.length ? `${letter}: ${short(value)}` : short(value)).join(', ');
 }
 
 // Plots the numbers of disks inside an open system, and of those that have left and entered.
@@ -425,6 +431,12 @@ function numbersNow() {
   return means.map((one, k) => ({ ...one, now: now[k] ?? null }));
 }
 
+// Explains the theoretical temperature, which is smaller than the kT in the pressure of an ideal gas, N kT per area.
+function temperatureInWords(rows) {
+  const theory = rows.find(({ name }) => name === 'temperature')?.theory;
+  return theory ? `The temperature excludes the mean motion: in theory it is kT (1 − 1/N), with N = ${disks} and kT = ${short(theory / (1 - 1 / disks))}.` : '';
+}
+
 // For a single run, the table lists the present, mean and theoretical value of each quantity. For several runs, it lists the
 // mean (or the present value if there is no mean) and the theoretical value of each run.
 function tellNumbers() {
@@ -440,7 +452,8 @@ function tellNumbers() {
   const kind = k => columns[k - 1]?.[0] === 'theory' ? ' class="law"' : '';
   const cells = (row, tag) => `<tr>${row.map((one, k) => `<${tag}${kind(k)}>${one}</${tag}>`).join('')}</tr>`;
   const isShort = columns.some(([, rows]) => rows.some(one => one.short && one.value !== null));
-  const note = isShort ? '<caption>± ?: the run is too short for an error</caption>' : '';
+  const notes = [isShort && '± ?: the run is too short for an error.', columns.some(([name]) => name === 'theory') && temperatureInWords(own)].filter(Boolean);
+  const note = notes.length ? `<caption>${notes.join(' ')}</caption>` : '';
   $('numbers').innerHTML = note + cells(['', ...columns.map(([name]) => name)], 'th') + own.map(({ name }) => [safe(name),
     ...columns.map(([, rows, text]) => text(rows.find(one => one.name === name) ?? { now: null, value: null, theory: null }))])
     .filter(row => row.slice(1).some(Boolean)).map(row => cells(row, 'td')).join('');

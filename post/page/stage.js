@@ -313,9 +313,9 @@ function drawNextEvent() {
   if (places.length && film.exact) labelEvent(`next event: t = ${short(when)}`, places.sort(([, one], [, other]) => one - other));
 }
 
-// Writes a label above the upper of the marked disks or, if there is no room, below the lower.
+// Writes a label above the upper of the marked disks or, if there is no room below the keys of the arrows, below the lower.
 function labelEvent(words, places) {
-  const size = 12 * page.dots, [x, y, r] = places[0], [, low, wide] = places.at(-1), isAbove = y - r > 2.5 * size;
+  const size = 12 * page.dots, [x, y, r] = places[0], [, low, wide] = places.at(-1), isAbove = y - r > 5 * size;
   Object.assign(marks, { font: `${size}px system-ui, sans-serif`, fillStyle: ink.accent, textAlign: 'center', textBaseline: 'middle' });
   const half = marks.measureText(words).width / 2 + 4 * page.dots;
   marks.fillText(words, clamp(x, half, page.width - half), isAbove ? y - r - size : low + wide + size);

@@ -271,6 +271,7 @@ function frameBetween(from, to, condition) {
 function overlay(list) {
   overlaid = list;
   if (film && source.curves()?.time.length) drawEnergies();
+  if (isEncounter()) tellOthers();
 }
 
 function choices(wish) {

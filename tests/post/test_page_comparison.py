@@ -284,3 +284,19 @@ def test_compared_pictures_are_scrolled_together_on_a_telephone(opened):
     after = opened.run(STAGES)
     assert after[0] == pytest.approx(after[1], abs=1)
     assert opened.run(AT_HISTOGRAM) == [True] * 3
+
+
+def test_the_time_appears_once_and_both_pressures_without_scrolling(opened):
+    opened.press("c")
+    moving(opened, 1)
+    opened.run("set('species.gas.speed', '2')")
+    moving(opened, 2)
+    force = "filmOf(current()).document.getElementById('force')"
+    opened.until(f"return /^A: [0-9.]+, B: [0-9.]+$/.test({force}.textContent)")
+    first, second = opened.run(f"return {force}.textContent").split(", ")
+    assert 3 < float(second[3:]) / float(first[3:]) < 5, "pressure is proportional to the energy"
+    assert opened.run(f"return {force}.getBoundingClientRect().bottom") < 700
+    clocks = "return films().map(one => one.document.getElementById('clock').innerText)"
+    bare, lead = opened.run(clocks)
+    assert bare.startswith("A: ") and "t =" not in bare
+    assert lead.startswith("t = ") and "B: " in lead

@@ -427,3 +427,16 @@ def test_a_variable_without_a_value_shows_the_value_that_acts(opened):
         assert opened.run(SHOWN, "contact.wall_restitution") == walls == str(laws["restitution"])
         words, field = opened.run(AT_SLIDER, "contact.wall_restitution")
         assert field == walls and words.startswith(f"{walls}, from ")
+
+
+def test_a_slider_without_a_value_says_which_variable_determines_it(opened):
+    """Without a restitution of their own, walls have that of two disks."""
+    opened.run("choose('cooling')")
+    opened.until("return !busy && current().wished.input === 'cooling'")
+    notes = "return [...document.querySelectorAll('.slider small')].map(one => one.textContent)"
+    opened.until(f"const notes = (() => {{ {notes} }})(); return notes.length === 5 && notes[1]")
+    assert opened.run(notes)[:2] == ["at once", "at once; as restitution of two disks"]
+    opened.run("set('contact.wall_restitution', '0.95')")
+    assert opened.run(notes)[1] == "at once"
+    opened.run("set('contact.restitution', '0.8')")
+    assert opened.run("return numberOf('contact.wall_restitution')") == 0.95

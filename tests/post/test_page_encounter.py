@@ -380,12 +380,54 @@ def test_compared_collisions_have_their_tables_side_by_side_at_one_time(two):
     assert collide(two)["separation"] == pytest.approx(0, abs=1e-12)
     at_once = "const [a, b] = films().map(one => one.inside().moment.time); return a === b && a > 0"
     two.until(at_once)
-    two.run("overlayAll()")
-    texts = """const { document } = filmOf(current()), other = document.querySelector('#others > div');
+    texts = """const { document } = filmOf(current());
+        const other = document.querySelector('#others > div');
         return [other, document.querySelector('.own')].map(part => [
           part.querySelector('h2').innerText, part.getBoundingClientRect().top,
-          [...part.querySelectorAll('table')].at(-1).rows[3].cells[2].textContent]);"""
+          [...part.querySelectorAll('table')].at(-1).rows[3]?.cells[2].textContent ?? '']);"""
     two.until(f"const [[,, words]] = (() => {{ {texts} }})(); return words.includes('ratio 1')")
     (first, top, _), (second, beside, speeds) = two.run(texts)
     assert (first, second) == ("Run A", "Momentum and energy of run B")
     assert top == beside and speeds.endswith("(ratio 0)")
+
+
+def test_walls_keep_the_energy_of_a_perfectly_inelastic_collision(two):
+    two.run("bounce(0)")
+    two.until("return current().changes.length === 1")
+    collide(two)
+    energy = bodies(two)[2, 5]
+    for _ in range(2):  # two events at walls
+        time = inside(two, "moment.time")
+        two.press("n")
+        wait_for(lambda t=time: inside(two, "moment.time") > t)
+    assert bodies(two)[2, 5] == pytest.approx(energy)
+
+
+def test_changes_are_listed_in_words(two):
+    for _ in range(2):
+        rerun(two, lambda: two.run(CLICK, "more"))
+    rerun(two, lambda: two.run("redefine('disk1', 'velocity', [0.415, -0.345])"))
+    words = "velocity of disk1 = (0.415, \u22120.345) · disk3 added · disk4 added"
+    assert two.run("return current().words") == words
+    one = two.run("return inWords(['species.disk1.position', '0.3,0.5'])")
+    assert one == "position of disk1 = (0.3, 0.5)", "the slider shows the height alone"
+    one = two.run("return inWords(['species.disk1.position', '0.25,0.5'])")
+    assert one == "height of disk 1 at the start = 0.5"
+
+
+#: Cells and fields of the tables of a panel that are too narrow for their content.
+NARROW = """const { document } = filmOf(current());
+    return [...document.querySelectorAll('.bodies :is(input, td, th)')]
+      .filter(one => one.scrollWidth > one.clientWidth)
+      .map(one => [one.value ?? one.textContent, one.scrollWidth, one.clientWidth])"""
+
+
+def test_no_number_of_the_table_is_cut_or_touches_another(two):
+    rerun(two, lambda: two.run(CLICK, "more"))
+    rerun(two, lambda: two.run("redefine('disk1', 'velocity', [-0.123456, -0.654321])"))
+    for size in SIZES:
+        two.resize(*size)
+        for is_bare in (False, True):
+            two.run("bare(arguments[0])", is_bare)
+            two.draw(3)
+            assert two.run(NARROW) == [], (size, is_bare)

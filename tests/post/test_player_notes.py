@@ -77,3 +77,25 @@ def test_energies_of_few_disks_without_gravity_are_step_functions(simulated, pla
     for line in corners:
         steps = np.abs(np.diff(line, axis=0))
         assert np.all(steps.min(axis=1) == 0), "each line is horizontal or vertical"
+
+
+RESTING = """&species name = 'bed' count = 20 radius = 0.02 region = 0, 1, 0, 0.4 /
+&species name = 'ball' radius = 0.05 position = 0.5, 0.8 velocity = 0, -1 /
+&stop time = 0.6 / &output event_log = .true. /"""
+
+
+def test_a_telephone_shows_title_note_and_labels_of_a_film_with_disks_at_rest(simulated, playing):
+    browser = playing(simulated(RESTING).path)
+    browser.resize(390, 844, True)
+    browser.run("layout(); go(0.3)")
+    assert browser.run("return film.speeds.rest")
+    seen = """return [...document.querySelectorAll(arguments[0])]
+        .map(one => one.offsetHeight > 0 && one.innerText)"""
+    assert browser.run(seen, "#speeds h2") == ["Speeds"]
+    assert browser.run(seen, "#bars")[0].startswith("At rest: ")
+    assert browser.run(seen, ".pace .word") == ["speed"]
+    share = browser.run("return $('histogram').clientWidth / $('speeds').clientWidth")
+    assert share > 0.9
+    assert "frame" not in browser.run("return $('clock').textContent")
+    assert browser.run("return $('clock').textContent").startswith("t = 0.3 · ")
+    assert browser.run("return document.documentElement.scrollWidth") <= 390
