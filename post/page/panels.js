@@ -302,8 +302,11 @@ function drawSpeedsAndRest(plot, counts, seen, others) {
   }
   pen.globalAlpha = 1;
   others.forEach(one => drawOutline(pen, one, speed => x(Math.log10(speed)), n => y(n ? Math.log10(n) : -0.3), 1));
-  $('bars').textContent = `At rest: ${counted.map(s => `${counts[s][0]} of ${seen[s]} ${kinds[s].name}`).join(', ')}. `
-    + 'Bars: the number of disks at each speed; both axes grow by factors of ten.';
+  // The number of disks at rest measures the size of a crater.
+  const atRest = one => one.counted.map(s => `${one.counts[s][0]} of ${one.seen[s]} ${one.kinds[s].name}`).join(', ');
+  const own = { counted, counts, seen, kinds }, runs = [...others, { ...own, letter: parent.letterOf?.(window) }];
+  $('bars').textContent = others.length ? `At rest: ${runs.map(one => `${one.letter}: ${atRest(one)}`).join('; ')}.`
+    : `At rest: ${atRest(own)}. Bars: the number of disks at each speed; both axes grow by factors of ten.`;
 }
 
 // ---------- plots of energies and pressure against time ----------

@@ -300,3 +300,15 @@ def test_the_time_appears_once_and_both_pressures_without_scrolling(opened):
     bare, lead = opened.run(clocks)
     assert bare.startswith("A: ") and "t =" not in bare
     assert lead.startswith("t = ") and "B: " in lead
+
+
+def test_compared_craters_show_how_many_disks_are_at_rest(opened):
+    """This number measures the size of a crater, in the laboratory as in a film."""
+    before = opened.run("return current().run")
+    opened.run("choose('crater')")
+    moving(opened, before)
+    opened.press("c")
+    moving(opened, before + 1)
+    text = "filmOf(current()).document.getElementById('bars')"
+    words = "/^At rest: A: [0-9]+ of 2000 bed, .*; B: [0-9]+ of 2000 bed/"
+    opened.until(f"return {words}.test({text}.innerText)")
