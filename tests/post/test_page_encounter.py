@@ -430,4 +430,5 @@ def test_no_number_of_the_table_is_cut_or_touches_another(two):
         for is_bare in (False, True):
             two.run("bare(arguments[0])", is_bare)
             two.draw(3)
-            assert two.run(NARROW) == [], (size, is_bare)
+            cells = "return filmOf(current()).document.querySelectorAll('.bodies input').length"
+            assert two.run(cells) == 9 and two.run(NARROW) == [], (size, is_bare)

@@ -37,7 +37,7 @@ def advance_and_record(
     end, _, last = limits
     while recorded < MOST_RECORDED and time.perf_counter() < deadline:
         coming = simulation.next_events(1)
-        if not coming or coming[0][0] >= end or simulation.events >= last:
+        if not coming or coming[0][0] > end or simulation.events >= last:
             break
         when, i, j = coming[0]
         gravity = np.asarray(simulation.parameters["box"]["gravity"], dtype=float)
