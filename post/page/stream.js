@@ -7,9 +7,12 @@
 const PAST_ROOM = 6e7, HEAD = 7, MOST_CURVE = 3000;
 const SAME_TIME = 1e-13;  // largest relative difference of two times that count as equal
 const NOTHING = { next: [], happened: null };
-const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, isChanged: true, curves: null, run: 0, wish: null };
+const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, asked: false, isChanged: true, curves: null, run: 0, wish: null };
 
-function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
+function send(wish) {
+  if (wish.do === 'play' || wish.do === 'pause') stream.asked = wish.do === 'play';
+  if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish));
+}
 
 // Opens a connection to a worker process, sends a request, and handles the messages of the worker.
 function talk(wish, heard) {
@@ -83,7 +86,7 @@ const hear = {
     if (isKnown) curves.news[curves.news.length - 1] = news; else addSample(curves, news);
     film.settles = news.settles;
     fitScales(news.speed);
-    if (!state.playing && source) show(moment.time, true);
+    if (!state.playing && film.exact) show(moment.time, true);
   },
   events(news) {
     const own = ([time, i, j]) => [time, i - 1, j - 1];
@@ -100,7 +103,9 @@ const hear = {
     if (isStarting()) return;  // the message belongs to the previous run
     if (reason && past.length && !state.playing) show(moment.time, true);  // a refused disk returns to its place
     stream.ended = ended;
-    if (!playing && state.playing && stream.live && past.length && !parent.isComparing()) play(false);
+    if (playing) stream.asked = false;
+    // The state after a step may arrive after the user has pressed play, before the worker process answers this request.
+    if (!playing && !stream.asked && state.playing && stream.live && past.length && !parent.isComparing()) play(false);
   },
   problems({ change }) {
     if (change) return;  // a refused change belongs to the previous run
@@ -115,7 +120,7 @@ function open({ facts, blocks, run }) {
   angles = facts.turning ? new Float32Array(disks) : null;
   const each = there => there ? kinds.map(() => []) : null;
   const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), inside: each(facts.isOpen), left: facts.isOpen ? [] : null, entered: facts.isOpen ? [] : null, pressure: [], news: [] };
-  Object.assign(stream, { live: true, ended: false, curves, run });
+  Object.assign(stream, { live: true, ended: false, asked: false, curves, run });
   encounter.collisions = [];
   source = fromWorker;
 }
