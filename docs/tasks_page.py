@@ -58,10 +58,12 @@ walls of the exam. With smooth walls it is {left_normal}.
 | 1000 | 537 | 610 | 663 |
 
 How large must the bed be? A bed needs about 7.5 M (1/f - 1)/(1 - ξ²) grains. Here M is the mass
-ratio, and f is the fraction of the energy that is left at the end. This exercise would need 2250
-grains. The slightly smaller bed of 2000 grains is acceptable, because fewer than 20 collisions with
-walls occur. If more wall collisions occur, the scripts exclude the crater from the fit and draw it
-as an open symbol.
+ratio, and f is the fraction of the energy that is left at the end. The formula holds for
+projectiles with 5 to 10 times the radius of a grain. With a ratio of 2 or 3 the projectile
+penetrates deeper, and the bed needs 1.5 times this number. This exercise would need 2250 grains.
+The slightly smaller bed of 2000 grains is acceptable, because fewer than 20 collisions with walls
+occur. If more wall collisions occur, the scripts exclude the crater from the fit and draw it as an
+open symbol.
 """,
     "energy": """\
 With every method the total energy is constant to a relative error of {energy_change}. The table

@@ -157,6 +157,31 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
         assert f"mass {mass},  speed 7,  radius 5,  restitution {xi} (runs: {count})" in line
 
 
+@pytest.mark.parametrize("beds", [(10, 10), (3600, 4000), (9000, 9000)])
+def test_a_bed_that_is_too_small_is_never_answered_with_a_smaller_one(beds):
+    """The bed is advised for the largest crater that reaches the box, whatever its estimate is."""
+    none = statistics.Estimate(0.0, 0.0)
+    values = {"mass": 40.0, "speed": 5.0, "radius": 2.0, "restitution": 0.5}
+    cut = [crater_scan.Point(values, (), {}, {}, none, none, False, False, n) for n in beds]
+    advised = crater_scan.larger_bed(cut, 0.1)
+    assert advised >= max(*(1.5 * n for n in beds), crater.enough_disks(40, 0.5, 0.1))
+    assert advised == {10: 3600, 4000: 6000, 9000: 13500}[beds[1]]
+    elastic = [p._replace(values=values | {"restitution": 1.0}) for p in cut]
+    assert np.isinf(crater_scan.larger_bed(elastic, 0.1))
+
+
+@pytest.mark.parametrize("walls", [(0, 0, 0), (0, 0, 3)])
+def test_a_scan_is_advised_a_bed_larger_than_its_own(tmp_path, walls):
+    paths = [
+        impact(tmp_path / f"{m}.h5", mass=m, moved=m, walls=hits)
+        for m, hits in zip((2, 4, 8), walls, strict=True)
+    ]
+    result = ricochet.analyse("crater_scan", paths)
+    advice = [text for text in result.warnings if "instead of 80" in text]
+    assert len(advice) == any(walls)
+    assert all(int(text.split(" disks")[0].split()[-1]) > 80 for text in advice)
+
+
 @samples(50, 500)
 @pytest.mark.parametrize("shared", [True, False])
 @pytest.mark.parametrize("runs", [2, 8])

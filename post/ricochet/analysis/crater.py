@@ -78,7 +78,9 @@ def enough_disks(mass_ratio: float, restitution: float, fraction: float) -> floa
     energy at which the run ends. In a large bed, about 3.4 M (1/f - 1) / (1 - xi^2) disks are hit.
     A bed with 2.2 times this number of disks is large enough. Both factors were measured in a
     square box, half filled at a packing fraction of 0.5, for M from 10 to 50, xi from 0.3 to 0.8,
-    ratios of radii from 2 to 10 and f = 0.1. The result is infinite for xi = 1 or f = 0.
+    ratios of radii from 5 to 10 and f = 0.1. A projectile with 2 or 3 times the radius of a bed
+    disk penetrates deeper, and a bed 1.5 times as large was sufficient in all cases. The result is
+    infinite for xi = 1 or f = 0.
     """
     if restitution >= 1 or fraction <= 0:
         return float("inf")

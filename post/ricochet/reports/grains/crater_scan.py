@@ -64,6 +64,7 @@ class Point(NamedTuple):
     side_collisions: Estimate  # per run
     by_time: bool  # some runs reached stop.time before the energy fraction
     free: bool  # limited by neither time nor walls
+    bed: int = 0  # number of disks in the bed; the largest one if the runs differ
 
     @property
     def runs(self) -> int:
@@ -98,7 +99,8 @@ def point(key: tuple[float, ...], runs: list[Run]) -> Point:
     free = not by_time and not box_takes_part(runs[0], hits.mean)
     values = dict(zip(AXES, key, strict=True))
     seeds = tuple(run.seed for run in runs)
-    return Point(values, seeds, sizes, means, left, hits, by_time, free)
+    lying = max(run.n_disks for run in runs) - 1
+    return Point(values, seeds, sizes, means, left, hits, by_time, free, lying)
 
 
 def curves_of(scans: Scans) -> Iterator[tuple[str, list[Point]]]:
@@ -140,6 +142,17 @@ def fitted_values(curve: list[Point], axis: str) -> int:
     return len({p.values[axis] for p in curve if p.free})
 
 
+def larger_bed(cut: list[Point], fraction: float) -> float:
+    """Return the number of disks in a bed that would suffice for craters that reach the box.
+
+    The number is rounded up to hundreds. Where a bed already has the estimated size, as under a
+    projectile of small radius, which penetrates deeper, a bed half as large again is advised.
+    """
+    estimated = [enough_disks(p.values["mass"], p.values["restitution"], fraction) for p in cut]
+    sizes = [max(1.5 * p.bed, size) for p, size in zip(cut, estimated, strict=True)]
+    return float(100 * np.ceil(max(sizes) / 100))
+
+
 def unfitted(scans: Scans, runs: list[Run]) -> list[str]:
     """Return why curves cannot be fitted, and the size of a bed that would allow a fit."""
     notes, fraction = [], energy_fraction(runs[0])
@@ -150,14 +163,14 @@ def unfitted(scans: Scans, runs: list[Run]) -> list[str]:
         what = f"no fit against {axis}: time or walls limit {len(cut)} of {len(curve)} points"
         if timed := sum(p.by_time for p in cut):
             what += f"; {timed} reached stop.time: increase it"
-        by_box = [p.values for p in cut if not p.by_time]
-        sizes = [enough_disks(v["mass"], v["restitution"], fraction) for v in by_box]
-        if sizes and np.isfinite(max(sizes)):
-            number = 100 * int(np.ceil(max(sizes) / 100))
-            what += f"; the crater reaches the box in {len(sizes)}: use about {number} disks"
-            what += f" instead of {span(np.array([run.n_disks - 1 for run in runs]))}"
-        elif sizes:
-            what += f"; the crater reaches the box in {len(sizes)}, and a larger bed would not help"
+        if by_box := [p for p in cut if not p.by_time]:
+            what += f"; the crater reaches the box in {len(by_box)}"
+            number = larger_bed(by_box, fraction)
+            if np.isfinite(number):
+                beds = span(np.array([p.bed for p in by_box]))
+                what += f": use about {number:.0f} disks instead of {beds}"
+            else:
+                what += ", and a larger bed would not help"
         notes.append(what)
     return notes
 
