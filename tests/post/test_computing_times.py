@@ -36,6 +36,10 @@ def test_cost_takes_the_best_of_equal_runs_and_fits_a_power(tmp_path):
         for k, (search, n, rate) in enumerate(kinds)
     ]
     drawn(tmp_path, "cost", *(run.path for run in runs))
+    for option, lines in (((1, 15), False), ((5, 40), True)):
+        more = [read_run(timed(tmp_path / "40.h5", 40, "pairs", collisions_per_second=4e4))]
+        notes = ricochet.analyse("cost", [*runs, *more], fit=option).notes
+        assert any("fits" in note for note in notes) == lines
     measured = cost.costs(runs)
     np.testing.assert_allclose(measured["pairs"], [[10, 20], [5, 10]])
     np.testing.assert_allclose(measured["cells"], [[10], [1]])

@@ -172,14 +172,22 @@ def test_a_bed_that_is_too_small_is_never_answered_with_a_smaller_one(beds):
 
 @pytest.mark.parametrize("walls", [(0, 0, 0), (0, 0, 3)])
 def test_a_scan_is_advised_a_bed_larger_than_its_own(tmp_path, walls):
+    """The caption describes a line as a fit only where a power law is fitted."""
     paths = [
         impact(tmp_path / f"{m}.h5", mass=m, moved=m, walls=hits)
         for m, hits in zip((2, 4, 8), walls, strict=True)
     ]
     result = ricochet.analyse("crater_scan", paths)
+    fitted = not any(walls)
+    assert any("Lines: fits" in note for note in result.notes) == fitted
+    drawn_lines = [line for axes in result.figure().axes for line in axes.lines]
+    pale = any(line.get_alpha() and len(line.get_xdata()) > 1 for line in drawn_lines)
+    assert any("Pale lines" in note for note in result.notes) == pale
+    assert pale or fitted
     advice = [text for text in result.warnings if "instead of 80" in text]
-    assert len(advice) == any(walls)
+    assert len(advice) == (not fitted)
     assert all(int(text.split(" disks")[0].split()[-1]) > 80 for text in advice)
+    plt.close("all")
 
 
 @samples(50, 500)

@@ -118,6 +118,9 @@ def test_the_rate_of_a_hopper_follows_the_law_that_it_has(tmp_path, capsys):
     assert [one[0] for one in found.values()] == pytest.approx([0.7, 1.4, 1.5], rel=1e-5)
     (fit,) = ricochet.analyse("discharge", paths).further[0]
     assert fit["k"] == pytest.approx(1.4, rel=1e-5)
+    for some, lines in ((paths, True), (paths[:2], False)):
+        notes = ricochet.analyse("discharge", some).notes
+        assert any("Lines: fits" in note for note in notes) == lines
     assert run_script("discharge", *paths, "-o", tmp_path / "rate.png") == 0
     assert " 1.4 " in capsys.readouterr().out.splitlines()[-2]
 

@@ -348,9 +348,12 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     points = [point(group.key, group.runs) for group in groups]
     scans, runs = scanned(points), [run for group in groups for run in group.runs]
     found = tables(scans)
-    notes = [
-        "Bars: standard errors of the mean over the beds. Lines: fits in the range of their points."
-    ]
+    notes = ["Bars: standard errors of the mean over the beds."]
+    if found.fits:
+        notes.append("Lines: fits in the range of their points.")
+    lines = sum(len(ALL) for _, curve in curves_of(scans) if len(curve) > 1)
+    if len(found.fits) < lines:
+        notes.append("Pale lines join points to which no power law is fitted.")
     if any(not p.free for p in points):
         notes.append("Open symbols: walls affect the crater, or stop.time was reached.")
     warnings = [*unfitted(scans, runs), *unused(points, scans), *found.missed]

@@ -252,7 +252,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     found = measured_rates(runs, options.after)
     fit = fit_of(found)
     notes = ["Bars and bands: standard errors of the mean, over time and over runs."]
-    if len(found.rows) > 1:
+    if fit:
         notes.append("Lines: fits, drawn over the fitted range on logarithmic axes.")
     numbers = [{name: value for one in fit for name, value in measured(one, fit[one]).items()}]
     further: list[Table] = [numbers] if fit else []

@@ -81,9 +81,9 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
         {"search": search, "exponent": law.exponent, "exponent_error": float(law.exponent_error)}
         for search, law in laws.items()
     ]
-    notes = [
-        "Shortest time of several runs. Solid lines: fits; dotted: outside the range of a fit."
-    ]
+    notes = ["Shortest time of several runs."]
+    if laws:
+        notes.append("Solid lines: fits; dotted: outside the range of a fit.")
     return Result(table, notes=notes, further=[exponents], values=(measured, laws))
 
 
