@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
 from matplotlib.ticker import LogFormatterMathtext, LogFormatterSciNotation
 
 from ..reading.files import RunError, did_you_mean
@@ -250,14 +250,15 @@ def name_curve(axes: Axes, x: float, y: float, name: str, colour: str) -> None:
 
 def separate_names(axes: Axes) -> None:
     """Shift names of curves up or down so that they do not overlap."""
-    names = [text for text in axes.texts if text.get_gid() == CURVE_NAME]
+    texts = [text for text in axes.texts if text.get_gid() == CURVE_NAME]
+    names = [text for text in texts if isinstance(text, Annotation)]
     figure = axes.get_figure(root=True)
     if not names or figure is None:
         return
     points = 72 / figure.dpi
     height = np.array([axes.transData.transform(name.xy)[1] for name in names]) * points
     order = np.argsort(height, kind="stable")
-    steps = LINE * names[0].get_fontsize() * np.arange(len(names))
+    steps = LINE * float(names[0].get_fontsize()) * np.arange(len(names))
     above = height[order] - steps
     # The mean of these two bounds is the increasing sequence with the smallest largest shift.
     low, high = np.maximum.accumulate(above), np.minimum.accumulate(above[::-1])[::-1]
