@@ -43,7 +43,7 @@ contains
     integer(int32) :: i
 
     allocate (sim%species(1))
-    sim%box = box_t()
+    sim%box%box_t = box_t()
     call sim%make_room(n)
     sim%law%restitution = reshape([1.0_real64], [1, 1])
     sim%box%upper = 4

@@ -207,7 +207,7 @@ contains
       code = 0
       if (changes_nothing(before, input, stepped=.true.)) return
       changed = session%sim
-      call change_system(changed, input%settings%system_t, problem)
+      call change_system(changed, input%settings%box, input%settings%system_t, problem)
       if (problem /= "") call fail(error, exit_usage, problem)
     end if
     if (.not. allocated(error)) call check_motion(changed, input%path, error)
@@ -445,7 +445,7 @@ contains
       end select
       if (width > 0) return
       call make_team(session%input%settings%run%threads)
-      list = frame_columns(sim)
+      list = frame_columns(sim, sim%box%periodic)
       list = pack(list, list%name == text_of(name))
       if (size(list) == 0) return
       width = list(1)%width

@@ -2,9 +2,8 @@
 !> (`&change`). Each change, scheduled or made in a simulation in memory, replaces some values in a
 !> copy of the given groups. The copy is converted to settings like the groups of an input file.
 module run_input
-  use box_geometry, only: box_t
-  use box_sides, only: bounds
-  use changes, only: continue_sides, missing_data
+  use box_state, only: bounds, box_state_t
+  use changes, only: missing_data
   use errors, only: error_t
   use input_fit, only: check_fit, complete_settings
   use input_groups, only: group_t, range_of, same_value, same_values
@@ -145,7 +144,7 @@ contains
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
     type(run_input_t) :: after
     type(problem_list_t) :: own
-    type(box_t) :: box
+    type(box_state_t) :: box
     character(len=:), allocatable :: problem
     integer :: k, line
 
@@ -171,9 +170,11 @@ contains
     end do
     if (own%count > 0) return
     change%is_empty = changes_nothing(before, after, stepped)
-    call continue_sides(box, after%settings%box, change%time)
+    call box%change(after%settings%box, change%time)
+    after%settings%box%side = box%side
     change%system = after%settings%system_t
-    deallocate (change%system%box%obstacle)
+    change%box = after%settings%box
+    deallocate (change%box%obstacle)
     before = after
   end subroutine plan_change
 
@@ -181,10 +182,10 @@ contains
   !> the edge of the box.
   function foreseen_box(input) result(box)
     type(run_input_t), intent(in) :: input
-    type(box_t) :: box
+    type(box_state_t) :: box
     integer :: k
 
-    box = input%settings%box
+    box%box_t = input%settings%box
     do k = 1, n_sides
       if (box%side(k)%is_piston()) deallocate (box%side(k)%motion)
     end do
@@ -194,7 +195,7 @@ contains
   subroutine changed_input(before, lines, box, t, after, problems, stepped)
     type(run_input_t), intent(in) :: before
     type(text_t), intent(in) :: lines(:)      !! changes of the form GROUP.VARIABLE=VALUE
-    type(box_t), intent(in) :: box      !! box before the change, with the positions of the sides
+    type(box_state_t), intent(in) :: box                            !! box before the change
     real(real64), intent(in) :: t                                   !! time relative to `box%epoch` [time]
     type(run_input_t), intent(out) :: after
     type(problem_list_t), intent(inout) :: problems
@@ -233,9 +234,10 @@ contains
   subroutine fold_changes(input, made, box, error)
     type(run_input_t), intent(inout) :: input
     integer(int64), intent(in) :: made                              !! number of changes
-    type(box_t), intent(in) :: box                                  !! present box
+    type(box_state_t), intent(in) :: box                            !! present box
     type(error_t), allocatable, intent(out) :: error
     type(run_input_t) :: before, after
+    type(box_state_t) :: foreseen
     type(problem_list_t) :: problems
     integer :: k
 
@@ -243,8 +245,10 @@ contains
     do k = 1, int(made)
       before = after
       associate (change => input%settings%schedule(k))
-        call changed_input(before, change%lines, foreseen_box(before), change%time, after, problems, stepped=.true.)
-        call continue_sides(foreseen_box(before), after%settings%box, change%time)
+        foreseen = foreseen_box(before)
+        call changed_input(before, change%lines, foreseen, change%time, after, problems, stepped=.true.)
+        call foreseen%change(after%settings%box, change%time)
+        after%settings%box%side = foreseen%side
       end associate
     end do
     call fold(after%given_groups)
@@ -280,7 +284,7 @@ contains
   !> simulation so far.
   subroutine move_sides(groups, box)
     type(group_t), intent(inout) :: groups(:)
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     real(real64) :: offsets(n_sides)
     integer :: g, side, axis
 
@@ -372,7 +376,7 @@ contains
   subroutine keep_sides(before, groups, box, t)
     type(group_t), intent(in) :: before(:)            !! groups of the present input
     type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
-    type(box_t), intent(in) :: box                    !! see `changed_input`
+    type(box_state_t), intent(in) :: box              !! see `changed_input`
     real(real64), intent(in) :: t                     !! see `changed_input`
     character(len=10), parameter :: of_motion(4) = [character(len=10) :: "motion", "velocity", "start_time", "end_time"]
     ! Positions of the sides (axis, lower or upper) and of one side [length]; time when a motion

@@ -3,7 +3,7 @@
 !> is counted as work. Scheduled changes are made by `timeline` when they are due.
 module changes
   use box_geometry, only: box_t
-  use box_sides, only: bounds
+  use box_state, only: bounds, box_state_t
   use disks, only: advance_disk
   use epochs, only: restart_epoch
   use errors, only: error_t, exit_broken, fail
@@ -16,7 +16,7 @@ module changes
   use texts, only: eol, written, written_exactly
   implicit none
   private
-  public :: change_positions, change_system, change_velocities, continue_sides, make_scheduled_change, missing_data
+  public :: change_positions, change_system, change_velocities, make_scheduled_change, missing_data
   public :: text_of_change
 
 contains
@@ -25,15 +25,12 @@ contains
   subroutine make_scheduled_change(sim, error)
     type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(out) :: error
-    type(system_t) :: system
     character(len=:), allocatable :: problem
 
     sim%changes_made = sim%changes_made + 1
     associate (change => sim%schedule(sim%changes_made))
       if (change%is_empty) return
-      system = change%system
-      system%box%obstacle = sim%box%obstacle
-      call change_system(sim, system, problem)
+      call change_system(sim, change%box, change%system, problem)
       if (problem /= "") call fail(error, exit_broken, change%origin//": "//problem)
     end associate
   end subroutine make_scheduled_change
@@ -54,43 +51,34 @@ contains
   !> box, contact law and driving of another input. The other input describes the same disks. Sides
   !> start new motions from their present positions. At the present time, the old and the new law of
   !> motion must therefore give the same position.
-  subroutine change_system(sim, system, problem)
+  subroutine change_system(sim, box, system, problem)
     type(simulation_t), intent(inout) :: sim
+    type(box_t), intent(in) :: box
     type(system_t), intent(in) :: system
     !> Reason why the system was not replaced; empty after success.
     character(len=:), allocatable, intent(out) :: problem
-    type(simulation_t) :: other
+    type(box_state_t) :: new_box
     real(real64) :: before                                   ! energy before the change [energy]
     real(real64) :: here(2, 2), there(2, 2)                  ! old and new positions of the sides [length]
-    integer :: k
+    logical :: own_sizes
 
-    problem = ""
-    other%specification_t = sim%specification_t
-    other%system_t = system
-    other%features%own_sizes = sim%features%own_sizes
-    other%box%epoch = sim%box%epoch
-    call continue_sides(sim%box, other%box, sim%now)
-    do k = 1, n_sides      ! a new piston keeps the side's position and velocity
-      if (.not. other%box%side(k)%is_piston()) cycle
-      associate (state => other%box%side(k)%state)
-        state%position = sim%box%side_position(k, sim%now)
-        state%velocity = 0
-        if (sim%box%side(k)%moves()) state%velocity = sim%box%side_velocity(k, sim%now)
-        state%clock = sim%now
-      end associate
-    end do
+    new_box = sim%box
+    call new_box%change(box, sim%now)
     call bounds(sim%box, sim%now, here(:, 1), here(:, 2))
-    call bounds(other%box, sim%now, there(:, 1), there(:, 2))
-    problem = missing_data(sim%system_t, other%system_t)
+    call bounds(new_box, sim%now, there(:, 1), there(:, 2))
+    problem = missing_data(sim%system_t, system)
     if (problem == "" .and. any(abs(there - here) > 1.0e-12_real64*minval(sim%box%edges()))) &
       problem = "a side would jump: at this time the new motion must have the position of the old one"
-    if (problem == "" .and. (other%features%open .neqv. sim%features%open)) problem = "side.open can change during a run only if " &
-      //"the input has a source, waiting disks, a side with the variable open, or a &change of open"
-    if (problem == "") problem = disk_in_the_way(sim, other%box)
+    if (problem == "" .and. (system%features%open .neqv. sim%features%open)) problem = "side.open can change during a run only " &
+      //"if the input has a source, waiting disks, a side with the variable open, or a &change of open"
+    if (problem == "") problem = disk_in_the_way(sim, new_box%box_t)
     if (problem /= "") return
     before = total_energy(sim)
     call advance_all(sim)
-    sim%system_t = other%system_t
+    own_sizes = sim%features%own_sizes
+    sim%box = new_box
+    sim%system_t = system
+    sim%features%own_sizes = own_sizes
     call sim%fit_series()
     call count_kicks()
     if (allocated(sim%source_time)) sim%source_time = max(sim%source_time, nearest(sim%time(), -1.0_real64))
@@ -155,15 +143,6 @@ contains
       problem = "the change needs data that the disks do not have: rotation, orientation, contact_time > 0 and " &
         //"drive.kind = 'recycle' must be there from the start"
   end function missing_data
-
-  !> Starts new motions of sides from their present positions. Unchanged motions continue.
-  pure subroutine continue_sides(before, after, t)
-    type(box_t), intent(in) :: before
-    type(box_t), intent(inout) :: after
-    real(real64), intent(in) :: t                            !! relative to `box%epoch` [time]
-
-    call after%side%follow(before%side, before%epoch, t)
-  end subroutine continue_sides
 
   !> Sets the velocities of all disks.
   subroutine change_velocities(sim, v)

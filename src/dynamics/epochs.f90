@@ -1,7 +1,7 @@
 !> Divides a run into epochs. At the end of an epoch the time origin moves. This time depends only
 !> on the state of the simulation, not on the search, the queue or the number of threads.
 module epochs
-  use box_sides, only: separate_from_sides
+  use box_state, only: separate_from_sides
   use kinds, only: int32, int64, never, pi, real64
   use renumbering, only: renumber
   use shapes, only: magnitude
@@ -148,7 +148,7 @@ contains
     sim%now = sim%now - shift
     sim%last_advance = sim%last_advance - shift
     sim%box%epoch = sim%box%epoch + shift
-    sim%box%side%state%clock = sim%box%side%state%clock - shift
+    sim%box%piston%clock = sim%box%piston%clock - shift
     if (.not. any(sim%box%side%moves())) return      ! rounding affects only contacts with moving sides
     do i = 1, sim%n_disks()
       if (sim%is_inside(i)) call separate_from_sides(sim%box, sim%disk(i), sim%now)

@@ -7,7 +7,7 @@
 !> counter of the partner, and the next event of the disk is predicted instead.
 module event_driven
   use kinds, only: int16, int32, int64, never, real64
-  use box_sides, only: side_time
+  use box_state, only: side_time
   use collapses, only: still, watch
   use calendar, only: most_coming, stages
   use cell_grid, only: cell_grid_t

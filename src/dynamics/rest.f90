@@ -2,7 +2,7 @@
 !> inelastic collapse. The results depend only on the state of the simulation, not on the search,
 !> the queue or the number of threads.
 module rest
-  use box_sides, only: bounds, next_side
+  use box_state, only: bounds, next_side
   use encounters, only: is_passage
   use epochs, only: most_events
   use kinds, only: int32, int64, never, real64

@@ -101,7 +101,7 @@ contains
     if (code > 0 .or. is_side(code)) return
     x = sim%position(i)
     v = sim%velocity(i)
-    normal = wall_normal(sim%box, code, x, v)
+    normal = wall_normal(sim%box%box_t, code, x, v)
     associate (shape => sim%box%obstacle(obstacle_number(code))%shape)
       yes = abs(dot_product(v, normal)) < grazing*magnitude(v) .and. shape%is_concave_at(shape%from_nearest(x, sim%box%images()))
     end associate

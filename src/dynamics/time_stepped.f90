@@ -8,8 +8,8 @@
 module time_stepped
   use images, only: images_t
   use kinds, only: int32, int64, largest_exact, never, real64
-  use box_geometry, only: normal_surface_velocity, wall_normal
-  use box_sides, only: bounds
+  use box_geometry, only: wall_normal
+  use box_state, only: bounds, normal_surface_velocity
   use encounters, only: collide, depart, encounter_text, is_passage, pass_side
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
@@ -175,7 +175,7 @@ contains
       if (sim%is_inside(i)) call meet_sides()
       i = next_marked(self%outside, i)
     end do
-    call self%near%mark_overlaps(sim%box, self%x, self%radius)
+    call self%near%mark_overlaps(sim%box%box_t, self%x, self%radius)
     k = next_marked(self%near%hit(:self%near%n), 0)
     do while (k > 0)
       associate (i => self%near%i(k), partner => self%near%partner(k))
@@ -227,7 +227,7 @@ contains
       integer(int32), intent(in) :: i, code
       real(real64) :: normal(2)
 
-      normal = wall_normal(sim%box, code, [self%x(i, 1), self%x(i, 2)], sim%velocity(i))
+      normal = wall_normal(sim%box%box_t, code, [self%x(i, 1), self%x(i, 2)], sim%velocity(i))
       if (dot_product(sim%velocity(i) - normal_surface_velocity(sim%box, code, normal, sim%now), normal) < 0) &
         call collide(sim, i, code, sim%now, .true., log)
     end subroutine meet_wall

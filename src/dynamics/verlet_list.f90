@@ -102,7 +102,7 @@ contains
     do k = 1, sim%box%n_obstacles()
       do i = 1, sim%n_disks()
         if (.not. sim%is_inside(i)) cycle
-        if (obstacle_gap(sim%box, k, [x(i, 1), x(i, 2)], sim%disk(i)%radius) <= self%skin) &
+        if (obstacle_gap(sim%box%box_t, k, [x(i, 1), x(i, 2)], sim%disk(i)%radius) <= self%skin) &
           call append(self, i, obstacle_code(k))
       end do
     end do

@@ -276,7 +276,6 @@ contains
         modulo(side, 2) == 1)
       call place%place(offset)
       if (.not. allocated(place%motion)) return
-      if (place%motion%is_piston()) place%state%position = offset
       call place%motion%check(fields)
       problems = fields%problems
     end subroutine take_motion

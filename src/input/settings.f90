@@ -2,6 +2,7 @@
 !> defaults. The module `variables` describes the meaning, range and unit of each variable.
 module settings
   use kinds, only: int64, never, real64
+  use box_geometry, only: box_t
   use disks, only: species_t
   use errors, only: error_t
   use input_groups, only: group_t, text_length
@@ -114,6 +115,7 @@ module settings
   end type output_settings_t
 
   type, extends(system_t) :: settings_t
+    type(box_t) :: box
     type(run_settings_t) :: run
     type(species_settings_t), allocatable :: species(:)
     type(stop_settings_t) :: stop
@@ -203,7 +205,7 @@ contains
       .and. .not. (self%box%is_sheared() .or. self%features%open .or. any(self%box%side%is_piston())) &
       .and. (self%run%threads > 1 .or. self%n_disks() >= many_disks)
     if (.not. (yes .and. allocated(self%schedule))) return
-    yes = .not. any([(self%schedule(k)%system%box%side%is_piston(), k=1, size(self%schedule))])
+    yes = .not. any([(self%schedule(k)%box%side%is_piston(), k=1, size(self%schedule))])
   end function wants_domains
 
 end module settings

@@ -245,7 +245,7 @@ contains
     associate (settings => input%settings%output)
       allocate (self%track(merge(events, values, settings%event_log)))
       self%track(frames)%counter = frame_counter
-      self%columns = frame_columns(sim, settings%frame_columns)
+      self%columns = frame_columns(sim, sim%box%periodic, settings%frame_columns)
       self%track(frames)%series = frame_series(self%columns, sim%n_disks(), settings%single_precision)
       self%track(values)%counter = sample_counter
       self%track(values)%series = observable_series(observed(sim))

@@ -9,7 +9,7 @@ module state_record
   use partners, only: n_sides
   use record, only: checksum, reading, record_t
   use sampling_schedule, only: progress_t
-  use simulation_state, only: simulation_t, system_t
+  use simulation_state, only: simulation_t
   implicit none
   private
   public :: exchange_all, layout
@@ -50,9 +50,9 @@ contains
     call record%exchange(file, sim%changes)
     call exchange_tally(file, record, sim)
     if (allocated(sim%waits)) call exchange_waiting(file, record, sim)
-    call record%exchange(file, sim%box%side%state%clock)
-    call record%exchange(file, sim%box%side%state%position)
-    call record%exchange(file, sim%box%side%state%velocity)
+    call record%exchange(file, sim%box%piston%clock)
+    call record%exchange(file, sim%box%piston%position)
+    call record%exchange(file, sim%box%piston%velocity)
     offset = sim%box%side%offset()
     call record%exchange(file, offset)
     call sim%box%side%place(offset)
@@ -79,7 +79,6 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int64) :: made, identity, there
     character(len=:), allocatable :: text
-    type(system_t) :: system
     integer :: i
 
     made = sim%changes_made
@@ -97,9 +96,8 @@ contains
     sim%changes_made = -1
     if (there /= identity) return
     sim%changes_made = made
-    system = sim%schedule(made)%system
-    call move_alloc(sim%box%obstacle, system%box%obstacle)
-    sim%system_t = system
+    sim%system_t = sim%schedule(made)%system
+    call sim%box%specify(sim%schedule(made)%box)
   end subroutine exchange_changes
 
   !> Counts, writes or reads the sums and counters over all events.

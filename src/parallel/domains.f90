@@ -102,6 +102,7 @@ contains
 
       if (.not. allocated(self%sim%species)) then
         self%sim%specification_t = sim%specification_t
+        self%sim%box = sim%box
         self%sim%epoch_end = forever
         allocate (self%engine%search)
         self%engine%is_part = .true.

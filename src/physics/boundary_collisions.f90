@@ -1,8 +1,8 @@
 !> Executes collisions of disks with sides and obstacles.
 module boundary_collisions
   use kinds, only: int32, never, real64
-  use box_geometry, only: next_obstacle, normal_surface_velocity, tangential_surface_velocity, wall_normal
-  use box_sides, only: side_time
+  use box_geometry, only: next_obstacle, tangential_surface_velocity, wall_normal
+  use box_state, only: normal_surface_velocity, side_time
   use tangential_law, only: tangential_impulse, tangential_law_t
   use wall_law, only: wall_law_t, wall_rebound
   use disks, only: advance_disk
@@ -36,9 +36,9 @@ contains
     call advance_disk(sim%disk(i), sim%box%gravity, t)
     k = sim%box%surface_of(code)
     law = sim%box%surface(k)%law
-    normal = wall_normal(sim%box, code, sim%disk(i)%x, sim%disk(i)%v)
+    normal = wall_normal(sim%box%box_t, code, sim%disk(i)%x, sim%disk(i)%v)
     normal_velocity = normal_surface_velocity(sim%box, code, normal, t)
-    u = tangential_surface_velocity(sim%box, code, sim%disk(i)%x, normal) + normal_velocity
+    u = tangential_surface_velocity(sim%box%box_t, code, sim%disk(i)%x, normal) + normal_velocity
     v = sim%disk(i)%v
     omega = sim%spin(i)
     if (law%temperature > 0) then
@@ -91,7 +91,7 @@ contains
 
     if (.not. sim%box%side(1 - code)%is_piston()) return
     axis = axis_of(code)
-    associate (motion => sim%box%side(1 - code)%motion, side => sim%box%side(1 - code)%state, disk => sim%disk(i))
+    associate (motion => sim%box%side(1 - code)%motion, side => sim%box%piston(1 - code), disk => sim%disk(i))
       v = sim%box%side_velocity(1 - code, t)
       given = motion%taken_from(dot_product(disk%v - before, normal), sim%mass_of(i))
       disk%v = disk%v - given*normal
@@ -149,7 +149,7 @@ contains
       do while (speed < disk%radius/contact_time)
         t = never
         if (is_side(code)) t = side_time(sim%box, disk, code)
-        if (.not. is_side(code)) call next_obstacle(sim%box, disk, code, [code], t, partner)
+        if (.not. is_side(code)) call next_obstacle(sim%box%box_t, disk, code, [code], t, partner)
         if (t - disk%clock > shortest_separation*contact_time) return
         if (t > latest) best = disk%v
         latest = max(latest, t)

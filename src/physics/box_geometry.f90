@@ -1,6 +1,7 @@
-!> The box: four sides (walls or periodic boundaries), fixed obstacles, and gravity. The time when a
-!> disk touches part of the box depends only on the state of that disk. All times, including the
-!> clocks of disks, are relative to the time origin `box%epoch`.
+!> The box as specified by the input: four sides (walls or periodic boundaries), fixed obstacles,
+!> and gravity. Its state during a run is in `box_state`. The time when a disk touches an obstacle
+!> depends only on the state of that disk. All times, including the clocks of disks, are relative to
+!> the time origin `epoch` of the state of the box.
 module box_geometry
   use box_side, only: side_t
   use wall_law, only: wall_law_t
@@ -11,8 +12,8 @@ module box_geometry
   use shapes, only: shape_t, spare
   implicit none
   private
-  public :: box_t, surface_t
-  public :: find_image_contact, free_area, next_obstacle, normal_surface_velocity, obstacle_gap, stays_clear
+  public :: box_t, obstacle_t, surface_t
+  public :: find_image_contact, free_area, next_obstacle, obstacle_gap, spans, stays_clear
   public :: tangential_surface_velocity, wall_normal
 
   !> A side of the box, or a group of obstacles with a common contact law and common sums over
@@ -39,8 +40,6 @@ module box_geometry
     logical, dimension(n_sides) :: open = .false.  !! whether disks leave the box through each side
     type(obstacle_t), allocatable :: obstacle(:)   !! obstacles of a group are consecutive
     type(side_t) :: side(n_sides)               !! motions of the left, right, bottom and top side
-    !> Time origin of all clocks, measured from the start of the run [time].
-    real(real64) :: epoch = 0.0_real64
   contains
     procedure :: edges
     procedure :: periods
@@ -61,8 +60,6 @@ module box_geometry
     procedure :: does_work
     procedure :: gives_energy
     procedure :: side_excursion
-    procedure :: side_position
-    procedure :: side_velocity
   end type box_t
 
   interface box_t
@@ -271,25 +268,15 @@ contains
     length = transpose(reshape(self%side%reach(), [2, 2]))
   end function side_excursion
 
-  !> Inward displacement of side k from its mean position at a given time.
-  pure function side_position(self, k, t) result(x)
-    class(box_t), intent(in) :: self
-    integer, intent(in) :: k
-    real(real64), intent(in) :: t               !! relative to the time origin `box%epoch` [time]
-    real(real64) :: x                           !! [length]
+  !> True for each periodic axis along which the region spans the whole period. Along such an axis
+  !> disks may overlap the edges of the region.
+  pure function spans(region, box) result(yes)
+    real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
+    type(box_t), intent(in) :: box
+    logical :: yes(2)
 
-    x = self%side(k)%position(self%epoch, t)
-  end function side_position
-
-  !> Inward velocity of side k at a given time.
-  pure function side_velocity(self, k, t) result(v)
-    class(box_t), intent(in) :: self
-    integer, intent(in) :: k
-    real(real64), intent(in) :: t               !! relative to the time origin `box%epoch` [time]
-    real(real64) :: v                           !! [length/time]
-
-    v = self%side(k)%velocity(self%epoch, t)
-  end function side_velocity
+    yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
+  end function spans
 
   !> Finds the first contact of a disk with any of the given obstacles, if it precedes the earliest
   !> event found so far. Only images shifted by at most one period need to be tested. A disk that
@@ -467,19 +454,6 @@ contains
       end if
     end associate
   end function tangential_surface_velocity
-
-  !> Normal velocity of a surface; zero for obstacles, which do not move.
-  pure function normal_surface_velocity(box, code, normal, t) result(u)
-    type(box_t), intent(in) :: box
-    integer(int32), intent(in) :: code
-    real(real64), intent(in) :: normal(2)       !! unit vector from the surface to a disk
-    real(real64), intent(in) :: t               !! relative to the time origin `box%epoch` [time]
-    real(real64) :: u(2)                        !! [length/time]
-
-    u = 0
-    if (.not. is_side(code)) return
-    if (allocated(box%side(1 - code)%motion)) u = box%side_velocity(1 - code, t)*normal
-  end function normal_surface_velocity
 
   !> Unit normal vector of a surface at its contact with a disk, pointing towards the disk.
   pure function wall_normal(box, code, x, v) result(normal)

@@ -3,7 +3,7 @@ module observables
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use kinds, only: int32, real64
   use box_geometry, only: box_t, free_area
-  use box_sides, only: bounds
+  use box_state, only: bounds
   use features, only: features_t
   use partners, only: n_sides
   use simulation_state, only: simulation_t
@@ -201,7 +201,7 @@ contains
     empty%changes = 1
     call empty%make_room(0)
     call empty%tally%make_room(n_sides)
-    empty%box = box_t()
+    empty%box%box_t = box_t()
     empty%box%surface%law%temperature = 1         ! thermal, sliding walls have every observable of walls
     empty%box%surface%law%speed = 1
     empty%features%stress = .true.
@@ -312,7 +312,7 @@ contains
 
     pressure = kinetic
     if (sim%time() > 0) pressure = pressure + 0.5_real64*sim%tally%total(virial)/sim%time()
-    box = sim%box
+    box = sim%box%box_t
     if (any(box%side%moves_permanently())) call bounds(sim%box, sim%now, box%lower, box%upper)
     pressure = pressure/free_area(box)
   end function pressure

@@ -43,25 +43,27 @@ module sample_values
 contains
 
   !> True for each of `all_columns` that is available in frames of a system.
-  pure function has_columns(system) result(yes)
+  pure function has_columns(system, periodic) result(yes)
     class(system_t), intent(in) :: system
+    logical, intent(in) :: periodic(2)                    !! whether the box is periodic along each axis
     logical :: yes(size(all_columns))
 
-    yes = [.true., .true., .true., system%features%open, any(system%box%periodic), system%features%rotation, &
+    yes = [.true., .true., .true., system%features%open, any(periodic), system%features%rotation, &
       system%features%orientation, system%kick_counter() /= ""]
   end function has_columns
 
   !> Columns of the frames of a system: the positions, and the columns in `wanted`; by default, all
   !> available columns.
-  pure function frame_columns(system, wanted) result(list)
+  pure function frame_columns(system, periodic, wanted) result(list)
     class(system_t), intent(in) :: system
+    logical, intent(in) :: periodic(2)                    !! as in `has_columns`
     character(len=*), intent(in), optional :: wanted(:)   !! names of the requested columns
     type(frame_column_t), allocatable :: list(:)
     integer :: k
 
     list = all_columns
     where (list%name == the_count) list%name = system%kick_counter()
-    list = pack(list, has_columns(system))
+    list = pack(list, has_columns(system, periodic))
     if (present(wanted)) list = pack(list, [.true., (any(wanted == list(k)%name), k=2, size(list))])
   end function frame_columns
 

@@ -3,6 +3,7 @@
 module simulation_state
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: box_t
+  use box_state, only: box_state_t
   use contact_law, only: contact_law_t
   use disks, only: disk_t, extra_t, series_t, source_t, species_by_id, species_t, tag_t, whole_disk_t
   use features, only: features_t
@@ -37,10 +38,9 @@ module simulation_state
     procedure :: counter
   end type drive_t
 
-  !> The system: box, contact law, driving and features, which together determine the motion of the
-  !> disks.
+  !> The system: contact law, driving, sources and features, which together with the box determine
+  !> the motion of the disks.
   type :: system_t
-    type(box_t) :: box
     type(contact_law_t) :: law
     class(drive_t), allocatable :: drive          !! not allocated without driving
     type(source_t), allocatable :: source(:)      !! in the order of the file; not allocated without sources
@@ -54,7 +54,8 @@ module simulation_state
   !> A change of the system at a time known in advance.
   type :: change_t
     real(real64) :: time = never                  !! [time]
-    type(system_t) :: system      !! system after the change, without the obstacles, which stay the same
+    type(box_t) :: box            !! box after the change, without the obstacles, which stay the same
+    type(system_t) :: system      !! system after the change
     logical :: is_empty = .false.                 !! whether no value changes, so that nothing happens
     character(len=:), allocatable :: name
     character(len=:), allocatable :: origin       !! file, line and name of the change, for messages
@@ -69,6 +70,7 @@ module simulation_state
 
   !> A simulation: values given by the input, and the state stored in a checkpoint.
   type, extends(specification_t) :: simulation_t
+    type(box_state_t) :: box
     type(disk_t), allocatable :: disk(:)         !! disks, sorted by cells
     type(tag_t), allocatable :: tag(:)           !! tags of the disks; `id` is the number in the input
     real(real64), allocatable :: own_mass(:)     !! allocated if masses within a species differ [mass]
@@ -326,11 +328,12 @@ contains
   end subroutine list_disks
 
   !> True if the disks have the optional data of `extra_t`.
-  pure function has_extra(self) result(yes)
+  pure function has_extra(self, periodic) result(yes)
     class(system_t), intent(in) :: self
+    logical, intent(in) :: periodic(2)            !! whether the box is periodic along each axis
     logical :: yes
 
-    yes = any(self%box%periodic) .or. self%law%contact_time > 0 .or. self%features%rotation .or. self%features%orientation
+    yes = any(periodic) .or. self%law%contact_time > 0 .or. self%features%rotation .or. self%features%orientation
   end function has_extra
 
   !> True if an inelastic collapse has occurred.
@@ -398,7 +401,7 @@ contains
     own_masses = self%features%own_sizes
     if (present(like)) own_masses = allocated(like%own_mass)
     allocate (self%disk(n), self%tag(n))
-    if (self%has_extra()) allocate (self%extra(n))
+    if (self%has_extra(self%box%periodic)) allocate (self%extra(n))
     if (own_masses) allocate (self%own_mass(n), source=0.0_real64)
     if (self%kick_counter() /= "" .and. .not. present(like)) allocate (self%drive_count(n), source=0_int64)
     if (present(like)) return

@@ -7,6 +7,7 @@
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
+  use box_state, only: box_state_t
   use contact_law, only: elastic_contacts
   use disks, only: disks_before, species_by_id, species_t
   use errors, only: error_t, exit_usage, fail
@@ -78,7 +79,7 @@ contains
     growth%full = full
     growth%stream = stream
     associate (sim => growth%sim)
-      sim%box = box
+      sim%box = box_state_t(box)
       sim%box%gravity = 0
       sim%box%shear_rate = 0
       sim%species = species
@@ -312,7 +313,7 @@ contains
       distance = min(never, minval([x - box%lower, box%upper - x], mask=.not. [box%periodic, box%periodic]))
       e = near%first_near(x)
       do while (e > 0)
-        distance = min(distance, obstacle_gap(box, obstacle_number(near%entry(e)%code), x, 0.0_real64))
+        distance = min(distance, obstacle_gap(box%box_t, obstacle_number(near%entry(e)%code), x, 0.0_real64))
         e = near%entry(e)%next
       end do
     end associate

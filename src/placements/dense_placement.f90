@@ -1,8 +1,8 @@
 !> Placement by compression (see `dense_growth`). All species of a region are compressed together;
 !> disks placed earlier act as fixed obstacles.
 module dense_placement
-  use box_geometry, only: box_t
-  use box_sides, only: bounds, spans
+  use box_geometry, only: box_t, spans
+  use box_state, only: bounds
   use circles, only: new_circle
   use dense_growth, only: grow_disks
   use errors, only: error_t
@@ -72,7 +72,7 @@ contains
     call bounds(packing%box, 0.0_real64, box%lower, box%upper)
     box%lower = max(region([1, 3]), box%lower)
     box%upper = min(region([2, 4]), box%upper)
-    box%periodic = spans(region, packing%box)
+    box%periodic = spans(region, packing%box%box_t)
     images = packing%box%images()
     do pass = 1, 2  ! first count the obstacles, then create them
       n = packing%box%n_obstacles()

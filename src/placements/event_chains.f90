@@ -26,6 +26,7 @@
 module event_chains
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
+  use box_state, only: box_state_t
   use packing, only: packing_t
   use random_stream, only: random_stream_t
   use status_line, only: status_line_t
@@ -120,7 +121,7 @@ contains
       where (radius <= limit) layer = layer + 1
       limit = 0.5_real64*limit
     end do
-    packing = packing_t(box, size(radius), int(maxval(layer)))
+    packing = packing_t(box_state_t(box), size(radius), int(maxval(layer)))
     do k = 1, maxval(layer)
       if (any(layer == k)) call packing%open_species(k, maxval(radius, mask=layer == k), count(layer == k), box%lower, box%upper)
     end do

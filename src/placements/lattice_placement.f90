@@ -1,7 +1,7 @@
 !> Placement on a triangular lattice.
 module lattice_placement
-  use box_geometry, only: box_t
-  use box_sides, only: centre_range, spans
+  use box_geometry, only: spans
+  use box_state, only: box_state_t, centre_range
   use fields, only: fields_t
   use kinds, only: real64
   use packing, only: packing_t
@@ -56,7 +56,7 @@ contains
   !> remain empty.
   pure subroutine find_lattice(region, box, count, radius, x, misfit)
     real(real64), intent(in) :: region(4)                   !! xlo, xhi, ylo, yhi [length]
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     integer, intent(in) :: count                            !! number of disks
     real(real64), intent(in) :: radius                      !! largest radius of the disks [length]
     real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count) [length]
@@ -67,7 +67,7 @@ contains
     integer :: k, row, fits, more, middle
 
     misfit = ""
-    lattice%periodic = spans(region, box)
+    lattice%periodic = spans(region, box%box_t)
     call centre_range(region, box, radius, lower, upper)
     lattice%edges = upper - lower
     call lattice%choose(count)

@@ -1,6 +1,6 @@
 !> Placement by random sequential insertion (see `random_insertion`).
 module random_placement
-  use box_sides, only: centre_range
+  use box_state, only: centre_range
   use fields, only: fields_t
   use kinds, only: int32, pi, real64
   use packing, only: packing_t

@@ -6,8 +6,7 @@
 !> halves the number of cell crossings.
 module cell_faces
   use kinds, only: int16, int32, never, real64
-  use box_geometry, only: box_t
-  use box_sides, only: side_time
+  use box_state, only: box_state_t, side_time
   use cell_layout, only: cell_layout_t
   use disks, only: disk_t
   use free_flight, only: flight, flight_velocity, negligible_speed, time_to_line
@@ -65,7 +64,7 @@ contains
   !> Sets up the faces of the cells in a block.
   subroutine set(self, box, layout, now)
     class(cell_faces_t), intent(out) :: self
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(cell_layout_t), intent(in) :: layout
     real(real64), intent(in) :: now
 
@@ -125,7 +124,7 @@ contains
   !> may therefore touch the disks in these cells.
   pure subroutine find_strips(self, box, small, now)
     class(cell_faces_t), intent(inout) :: self
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     real(real64), intent(in) :: small              !! maximum radius [length]
     real(real64), intent(in) :: now
     integer :: k
@@ -158,7 +157,7 @@ contains
   !> collision of a disk with a piston.
   pure subroutine watch_pistons(self, box, now)
     class(cell_faces_t), intent(inout) :: self
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     real(real64), intent(in) :: now
     real(real64) :: ahead, outwards
     integer :: k
@@ -231,7 +230,7 @@ contains
   !> Finds the earliest event at which the disk leaves its cell or touches a side in it.
   pure subroutine next(self, box, disk, cell, now, falling, near)
     class(cell_faces_t), intent(in) :: self
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
@@ -249,7 +248,7 @@ contains
   !> the faces of its cell, or closer lines that bound its neighbourhood.
   pure subroutine next_within(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
@@ -300,7 +299,7 @@ contains
   !> Version of `next_within` for parabolic paths and for boxes with moving sides.
   pure subroutine next_falling(self, box, column, row, disk, now, near)
     class(cell_faces_t), intent(in) :: self
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(line_t), intent(in) :: column(0:1), row(0:1)
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
@@ -321,7 +320,7 @@ contains
 
   !> Version of `next_falling` for a single axis without moving sides.
   pure subroutine next_along(box, line, axis, disk, now, t, code)
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
     integer(int32), intent(in) :: axis
     type(disk_t), intent(in) :: disk
@@ -360,7 +359,7 @@ contains
 
   !> Version of `next_falling` for a single axis of a box with moving sides.
   pure subroutine next_beside(box, line, axis, disk, now, t, code)
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
     integer(int32), intent(in) :: axis
     type(disk_t), intent(in) :: disk
@@ -380,7 +379,7 @@ contains
   pure subroutine next_moving(line, axis, box, disk, now, t, code)
     type(line_t), intent(in) :: line(0:1)          !! faces of the cell of the disk
     integer(int32), intent(in) :: axis
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
     real(real64), intent(out) :: t
@@ -407,7 +406,7 @@ contains
   pure function falling_time(line, axis, box, disk, now) result(t)
     type(line_t), intent(in) :: line
     integer(int32), intent(in) :: axis
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
     real(real64) :: t, sense, g

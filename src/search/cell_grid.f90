@@ -3,8 +3,8 @@
 !> crossing is an event. Wide cells overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
-  use box_geometry, only: box_t, next_obstacle
-  use box_sides, only: next_side
+  use box_geometry, only: next_obstacle
+  use box_state, only: box_state_t, next_side
   use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: cell_faces_t
   use cell_layout, only: cell_layout_t, whole_box
@@ -402,7 +402,7 @@ contains
   !> Determines when disk i leaves its neighbourhood, and copies its neighbour list.
   pure subroutine survey_list(self, box, disk, now, i, near)
     type(cell_grid_t), intent(in) :: self
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
     integer(int32), intent(in) :: i
@@ -418,7 +418,7 @@ contains
   !> Predicts the next events of two disks in unmarked cells, after collecting all candidates.
   subroutine predict_two(self, box, disk, tag, now, known, pair)
     class(cell_grid_t), intent(in) :: self
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
@@ -437,7 +437,7 @@ contains
   !> Predicts the next event of a disk in an unmarked cell.
   subroutine predict_one(self, box, disk, tag, now, known, i)
     class(cell_grid_t), intent(in) :: self
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
@@ -452,7 +452,7 @@ contains
   !> Finds when a disk leaves its cell, and collects the candidates for a collision until then.
   subroutine survey(self, box, disk, tag, now, known, near)
     class(cell_grid_t), intent(in) :: self
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     type(tag_t), intent(in) :: tag
     real(real64), intent(in) :: now
@@ -531,7 +531,7 @@ contains
 
     associate (i => near%disk, big => self%reach%big(self%reach%number_of(near%disk)))
       call next_side(sim%box, sim%disk(i), near%time, near%partner)
-      call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%last_partner, big%obstacles, near%time, near%partner)
+      call next_obstacle(sim%box%box_t, sim%disk(i), sim%tag(i)%last_partner, big%obstacles, near%time, near%partner)
       t_margin = sim%now + time_to_circle(sim%position(i) - big%centre, sim%velocity(i), sim%box%gravity, self%reach%margin, .true.)
       if (t_margin < near%time) near%partner = looks_again
       near%time = min(near%time, t_margin)

@@ -59,7 +59,7 @@ contains
     reach = 2*small*(1 + spare)
     width = max(sqrt(disks_per_cell*product(sim%box%edges())/(sim%n_disks() + sim%box%n_obstacles())), reach)
     if (undivided) width = never
-    layout = all_cells(sim%box, int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32), reach)
+    layout = all_cells(sim%box%box_t, int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32), reach)
     layout%small = small
   end function whole_box
 

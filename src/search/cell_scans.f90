@@ -100,8 +100,8 @@ contains
         if (entry%code <= 0) then
           number = entry%image
           shift = images%shift(number)
-          if (.not. stays_clear(sim%box, disk, entry%code, shift, near%time, falling)) &
-            call find_image_contact(sim%box, disk, last_partner, entry%code, shift, near%time, near%partner)
+          if (.not. stays_clear(sim%box%box_t, disk, entry%code, shift, near%time, falling)) &
+            call find_image_contact(sim%box%box_t, disk, last_partner, entry%code, shift, near%time, near%partner)
         else
           if (near%n > 0 .and. (near%n == list_capacity .or. any(entry%image /= last))) call test_disks()
           last = entry%image

@@ -10,7 +10,7 @@
 module collapses
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: tangential_surface_velocity, wall_normal
-  use box_sides, only: bounds
+  use box_state, only: bounds
   use clusters, only: cluster_t, contact_t, most_disks
   use disks, only: disk_t, advance_disk
   use encounters, only: are_in_contact, relative_motion
@@ -295,7 +295,7 @@ contains
     do k = 1, n_sides
       side = 1 - k
       if (sim%box%periodic(axis_of(side)) .or. sim%box%open(k)) cycle
-      normal = -wall_normal(sim%box, side, disk%x, disk%v)
+      normal = -wall_normal(sim%box%box_t, side, disk%x, disk%v)
       position = merge(lower(axis_of(side)), upper(axis_of(side)), sense_of(side) < 0)
       call add(side, sense_of(side)*(position - disk%x(axis_of(side))) - disk%radius, normal, sim%box%side_velocity(k, t))
     end do
@@ -320,7 +320,8 @@ contains
       contact%normal = normal
       contact%gap = max(gap, 0.0_real64)
       contact%closing = dot_product(disk%v, normal) + velocity
-      contact%sliding = dot_product(tangential_surface_velocity(sim%box, code, disk%x, -normal) - disk%v, [normal(2), -normal(1)])
+      contact%sliding = dot_product(tangential_surface_velocity(sim%box%box_t, code, disk%x, -normal) - disk%v, &
+        [normal(2), -normal(1)])
       contact%slip = -contact%sliding - disk%radius*sim%spin(i)
       associate (law => sim%box%surface(sim%box%surface_of(code))%law)
         contact%restitution = merge(1.0_real64, law%restitution, law%temperature > 0)

@@ -1,8 +1,8 @@
 !> Free positions in a region, chosen at random, for disks that are recycled or enter the box.
 module free_positions
   use kinds, only: int32, real64
-  use box_geometry, only: box_t
-  use box_sides, only: centre_range, spans
+  use box_geometry, only: box_t, spans
+  use box_state, only: centre_range
   use fields, only: fields_t
   use packing, only: packing_t
   use random_stream, only: random_stream_t

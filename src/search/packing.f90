@@ -9,6 +9,7 @@ module packing
   use obstacle_cells, only: obstacle_cells_t
   use partners, only: obstacle_number
   use box_geometry, only: box_t
+  use box_state, only: box_state_t
   use shapes, only: spare
   implicit none
   private
@@ -33,7 +34,7 @@ module packing
   end type placed_t
 
   type :: packing_t
-    type(box_t) :: box
+    type(box_state_t) :: box                        !! box at the time of the placement
     type(images_t), private :: images               !! periodic images of the box
     type(placed_t), allocatable :: disk(:)          !! placed disks
     type(layer_t), allocatable :: layer(:)          !! cells of each species
@@ -62,7 +63,7 @@ contains
 
   !> Creates an empty packing with space for `n_disks` disks.
   function empty_packing(box, n_disks, n_species) result(packing)
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     integer, intent(in) :: n_disks, n_species
     type(packing_t) :: packing
 
@@ -83,7 +84,7 @@ contains
     real(real64) :: side, extent(2), few
     integer(int32) :: n(2)
 
-    call self%near%serve(self%box, radius)
+    call self%near%serve(self%box%box_t, radius)
     extent = upper - lower
     few = 2.0_real64*count
     side = max(2*radius, sqrt(extent(1)*extent(2)/few), maxval(extent)/few)
@@ -303,7 +304,7 @@ contains
     do s = 1, size(self%layer)
       if (.not. allocated(self%layer(s)%head)) cycle
       rho = radius + self%layer(s)%radius
-      call range_images(self%box, centre, rho, first, last)
+      call range_images(self%box%box_t, centre, rho, first, last)
       do ky = first(2), last(2)
         do kx = first(1), last(1)
           call search_layer(self, s, centre + [kx, ky]*self%box%edges(), half, radius, blocker)
@@ -406,7 +407,7 @@ contains
     n = 0
     do s = 1, size(self%layer)
       if (.not. allocated(self%layer(s)%head)) cycle
-      call range_images(self%box, p, reach + self%layer(s)%radius, first, last)
+      call range_images(self%box%box_t, p, reach + self%layer(s)%radius, first, last)
       do ky = first(2), last(2)
         do kx = first(1), last(1)
           call append_cells(p + [kx, ky]*self%box%edges(), reach + self%layer(s)%radius)

@@ -1,4 +1,4 @@
-!> A side of the box, with its motion and the state of a piston.
+!> A side of the box, with its motion.
 module box_side
   use kinds, only: never, real64
   use side_motion, only: side_motion_t, side_state_t
@@ -10,7 +10,6 @@ module box_side
   type :: side_t
     !> Not allocated if the side is at rest at the edge of the box.
     class(side_motion_t), allocatable :: motion
-    type(side_state_t) :: state                      !! state of the side if it is a piston
   contains
     procedure :: moves
     procedure :: is_piston
@@ -101,24 +100,26 @@ contains
   end function highest_speed
 
   !> Inward displacement of the side at a given time.
-  elemental function position(self, epoch, t) result(x)
+  elemental function position(self, epoch, t, state) result(x)
     class(side_t), intent(in) :: self
     real(real64), intent(in) :: epoch                !! time origin [time]
     real(real64), intent(in) :: t                    !! time relative to the time origin [time]
+    type(side_state_t), intent(in) :: state          !! state of the side if it is a piston
     real(real64) :: x                                !! [length]
 
     x = 0
-    if (allocated(self%motion)) x = self%motion%position(self%motion%local_time(epoch, t, self%state), self%state)
+    if (allocated(self%motion)) x = self%motion%position(self%motion%local_time(epoch, t, state), state)
   end function position
 
   !> Inward velocity of the side at a given time.
-  elemental function velocity(self, epoch, t) result(v)
+  elemental function velocity(self, epoch, t, state) result(v)
     class(side_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! as in `position`
+    type(side_state_t), intent(in) :: state          !! as in `position`
     real(real64) :: v                                !! [length/time]
 
     v = 0
-    if (allocated(self%motion)) v = self%motion%velocity(self%motion%local_time(epoch, t, self%state), self%state)
+    if (allocated(self%motion)) v = self%motion%velocity(self%motion%local_time(epoch, t, state), state)
   end function velocity
 
   !> Sets the displacement of the side at the start of its motion. A side at rest away from the edge
@@ -135,17 +136,18 @@ contains
   end subroutine place
 
   !> Starts a new motion of the side at its position before a change. An unchanged motion continues.
-  elemental subroutine follow(self, before, epoch, t)
+  elemental subroutine follow(self, before, x, t)
     class(side_t), intent(inout) :: self
     type(side_t), intent(in) :: before
-    real(real64), intent(in) :: epoch, t             !! as in `position`
+    real(real64), intent(in) :: x                    !! inward displacement before the change [length]
+    real(real64), intent(in) :: t                    !! time of the change since the start of the run [time]
 
     if (continues(self, before)) then
       call self%place(before%offset())
     else if (allocated(self%motion)) then
-      call self%motion%place_at(before%position(epoch, t), epoch + t)
+      call self%motion%place_at(x, t)
     else
-      call self%place(before%position(epoch, t))
+      call self%place(x)
     end if
   end subroutine follow
 

@@ -10,7 +10,7 @@
 !> If any species is 'relaxed', all must be; their disks are placed together.
 module initial_positions
   use kinds, only: int32, int64, real64
-  use box_sides, only: centre_range
+  use box_state, only: centre_range
   use disks, only: disks_before
   use group_fields, only: group_fields_t
   use input_fit, only: report_file_problem, touching_tolerance
@@ -68,6 +68,7 @@ contains
       placed = species
       placed%count = species%count - species%waiting
       inside%specification_t = sim%specification_t
+      inside%box = sim%box
       inside%species%count = placed%count
       call inside%list_disks()
       call place_all(placed, groups, seed, unrelaxed, line, inside, problems)

@@ -2,6 +2,7 @@
 !> disks.
 module initial_state
   use kinds, only: int32, real64
+  use box_state, only: box_state_t
   use disks, only: disks_before
   use errors, only: error_t
   use initial_positions, only: place_disks
@@ -105,6 +106,7 @@ contains
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(inout) :: sim
 
+    sim%box = box_state_t(settings%box)
     sim%system_t = settings%system_t
     sim%seed = settings%run%seed
     sim%species = settings%species%species_t

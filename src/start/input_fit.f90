@@ -3,8 +3,8 @@
 !> input file.
 module input_fit
   use kinds, only: int32, int64, never, pi, real64
-  use box_geometry, only: box_t
-  use box_sides, only: bounds, spans
+  use box_geometry, only: box_t, spans
+  use box_state, only: bounds, box_state_t
   use drives, only: counting_drives, drive_counters
   use entries, only: check_source
   use errors, only: exit_files
@@ -83,7 +83,7 @@ contains
     integer :: k
 
     if (.not. allocated(settings%output%frame_columns)) return
-    associate (lacking => .not. has_columns(settings))
+    associate (lacking => .not. has_columns(settings, settings%box%periodic))
       do k = 1, size(all_columns)
         column = all_columns(k)
         if (column%name == "") then
@@ -106,6 +106,7 @@ contains
     !> .true. if the disks are already moving; their initial state is then not checked.
     logical, intent(in) :: running
     character(len=:), allocatable :: misfit                   ! "variable: problem"
+    type(box_state_t) :: box                                  ! box at the start
     real(real64) :: beyond(2, 2)
     type(extent_t) :: extent(size(settings%species))
     type(group_fields_t) :: fields
@@ -113,12 +114,13 @@ contains
 
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
-    associate (box => settings%box, species => settings%species)
+    box = box_state_t(settings%box)
+    associate (species => settings%species)
       beyond = box%side_excursion()      ! distance that moving sides extend beyond the box
       do k = 1, box%n_obstacles()                             ! each shape checks its position by `misfit`
         misfit = box%obstacle(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
-        if (misfit /= "") call report_obstacle_problem(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
-          problems)
+        if (misfit /= "") call report_obstacle_problem(box%box_t, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), &
+          misfit, problems)
         if (problems%count >= most_problems) exit
       end do
       do k = 1, merge(0, size(species), running)
@@ -126,19 +128,19 @@ contains
       end do
       if (allocated(settings%drive)) then
         fields = group_fields_t(groups(place_of("drive", groups%name)), problems)
-        call settings%drive%check(fields, box, species%count, species%radius)
+        call settings%drive%check(fields, box%box_t, species%count, species%radius)
         problems = fields%problems
       end if
       o = range_of(groups, ["source"])
       do k = 1, o(2) - o(1) + 1
         fields = group_fields_t(groups(o(1) + k - 1), problems)
-        call check_source(settings%source(k), fields, box, species(settings%source(k)%species)%radius)
+        call check_source(settings%source(k), fields, box%box_t, species(settings%source(k)%species)%radius)
         problems = fields%problems
       end do
       if (problems%count > 0) return
       extent = [(extent_of(species(k), k, settings%run%seed), k=1, size(species))]
       if (.not. running) call check_packing(species, extent, groups(s(1):s(2)), problems)
-      if (.not. running) call check_containers(box, sum(extent%area), groups(s(1)), problems)
+      if (.not. running) call check_containers(box%box_t, sum(extent%area), groups(s(1)), problems)
       if (problems%count == 0) call check_strokes(box, sum(extent%area), groups, problems)
     end associate
   end subroutine check_fit
@@ -251,7 +253,7 @@ contains
   !> total area of the disks. Boxes with a piston are not checked, because the disks can push it
   !> outwards.
   subroutine check_strokes(box, disks, groups, problems)
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     real(real64), intent(in) :: disks                         !! total area of the disks [length**2]
     type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
@@ -347,7 +349,7 @@ contains
   subroutine check_species(group, s, box, alone, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box                      !! box at the start
     !> .true. if this species consists of the only disk of the run.
     logical, intent(in) :: alone
     type(problem_list_t), intent(inout) :: problems
@@ -377,7 +379,7 @@ contains
 
       call bounds(box, 0.0_real64, low, high)
       sound = .false.
-      endless = spans(s%region, box)
+      endless = spans(s%region, box%box_t)
       lower = s%region(2*axis - 1)
       upper = s%region(2*axis)
       room = min(upper, high(axis)) - max(lower, low(axis))  ! width of the region between the displaced sides

@@ -85,7 +85,7 @@ contains
 
     lists = are_listed(settings)
     more = 0
-    if (settings%has_extra()) more = extra
+    if (settings%has_extra(settings%box%periodic)) more = extra
     associate (periods => merge(extra, 0.0_real64, any(settings%box%periodic)))
       starting = more + maxval([(settings%species(k)%placement%bytes(settings%features%own_sizes, periods), &
         k=1, size(settings%species))])
@@ -110,7 +110,7 @@ contains
     associate (frames => settings%output%sampling(1))
       if (.not. (any(frames%every < never) .or. allocated(frames%at) .or. frames%per_decade > 0)) return
     end associate
-    associate (columns => frame_columns(settings, settings%output%frame_columns))
+    associate (columns => frame_columns(settings, settings%box%periodic, settings%output%frame_columns))
       n = sum(columns%width)
     end associate
   end function numbers_in_frame

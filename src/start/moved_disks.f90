@@ -1,7 +1,7 @@
 !> Checks the positions of disks moved by the user in a running simulation, by the same rules as the
 !> initial positions of a run.
 module moved_disks
-  use box_sides, only: bounds
+  use box_state, only: bounds
   use errors, only: error_t, exit_usage, fail
   use input_fit, only: touching_tolerance
   use kinds, only: int32, real64

@@ -4,7 +4,7 @@ module test_systems
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: dp => real64, int32, int64, never
   use box_geometry, only: box_t, obstacle_gap
-  use box_sides, only: bounds
+  use box_state, only: bounds
   use disks, only: disk_t, tag_t
   use errors, only: error_t
   use event_driven, only: event_driven_t
@@ -88,7 +88,7 @@ contains
     type(simulation_t) :: sim
     integer(int32) :: i, n
     n = size(radius, kind=int32)
-    sim%box = box_t()
+    sim%box%box_t = box_t()
     allocate (sim%species(n), sim%law%restitution(n, n))
     call make_room(sim, n)
     sim%law%restitution = 1
@@ -183,7 +183,7 @@ contains
 
   !> Adds an obstacle to a box.
   subroutine add_obstacle(box, name, shape)
-    type(box_t), intent(inout) :: box
+    class(box_t), intent(inout) :: box
     character(len=*), intent(in) :: name
     class(shape_t), intent(in) :: shape
 
@@ -300,12 +300,12 @@ contains
       x = sim%position(i)
       associate (r => sim%disk(i)%radius)
         do j = 1, i - 1
-          dx = separation(sim%box, x, sim%position(j))
+          dx = separation(sim%box%box_t, x, sim%position(j))
           gap = min(gap, norm2(dx)/(r + sim%disk(j)%radius) - 1)
         end do
         gap = min(gap, minval(merge(never, min(x - low, high - x) - r, sim%box%periodic))/(2*r))
         do m = 1, sim%box%n_obstacles()
-          gap = min(gap, obstacle_gap(sim%box, m, x, r)/(2*r))
+          gap = min(gap, obstacle_gap(sim%box%box_t, m, x, r)/(2*r))
         end do
       end associate
     end do

@@ -1,25 +1,104 @@
-!> Positions of the sides of the box, and the times when disks reach them. Each such time depends
-!> only on the state of the disk. All times, including the clocks of disks, are relative to the time
-!> origin `box%epoch`.
-module box_sides
-  use box_geometry, only: box_t
+!> The state of the box during a run: the time origin, and the positions and velocities of pistons.
+!> The positions of all sides, and the times when disks reach them, are functions of this state.
+!> The time when a disk reaches a side depends only on the states of the disk and the side.
+module box_state
+  use box_geometry, only: box_t, obstacle_t, spans
+  use box_side, only: side_t
   use disks, only: disk_t
   use free_flight, only: flight, flight_velocity, time_to_line
   use kinds, only: int32, never, real64
-  use partners, only: axis_of, n_sides, sense_of
+  use partners, only: axis_of, is_side, n_sides, sense_of
+  use side_motion, only: side_state_t
   implicit none
   private
-  public :: bounds, centre_range, separate_from_sides, next_side, side_time, spans
+  public :: bounds, box_state_t, centre_range, next_side, normal_surface_velocity, separate_from_sides, side_time
 
   !> Rounding error of the gap between a disk and a moving side, relative to the magnitude of the
   !> coordinates.
   real(real64), parameter :: relative_error = 16*epsilon(1.0_real64)
 
+  !> A box during a run. All times, including the clocks of disks, are relative to the time origin
+  !> `epoch`.
+  type, extends(box_t) :: box_state_t
+    real(real64) :: epoch = 0.0_real64          !! time origin, measured from the start of the run [time]
+    type(side_state_t) :: piston(n_sides)       !! state of each side if it is a piston
+  contains
+    procedure :: side_position
+    procedure :: side_velocity
+    procedure :: specify
+    procedure :: change
+  end type box_state_t
+
+  interface box_state_t
+    module procedure box_at_start
+  end interface box_state_t
+
 contains
+
+  !> The state of a box at the start of a run. Pistons are at rest.
+  function box_at_start(box) result(state)
+    type(box_t), intent(in) :: box
+    type(box_state_t) :: state
+
+    state%box_t = box
+    state%piston%position = merge(box%side%offset(), 0.0_real64, box%side%is_piston())
+  end function box_at_start
+
+  !> Replaces the specification of the box, except its obstacles, which never change during a run.
+  subroutine specify(self, box)
+    class(box_state_t), intent(inout) :: self
+    type(box_t), intent(in) :: box
+    type(obstacle_t), allocatable :: obstacle(:)
+
+    call move_alloc(self%obstacle, obstacle)
+    self%box_t = box
+    call move_alloc(obstacle, self%obstacle)
+  end subroutine specify
+
+  !> Replaces the specification of the box at the time t of a run. A side with a new motion starts
+  !> it at its present position, and an unchanged motion continues. A piston keeps the present
+  !> velocity of its side.
+  subroutine change(self, box, t)
+    class(box_state_t), intent(inout) :: self
+    type(box_t), intent(in) :: box              !! new specification; its obstacles are not used
+    real(real64), intent(in) :: t               !! relative to the time origin `epoch` [time]
+    type(side_t) :: before(n_sides)
+    type(side_state_t) :: now(n_sides)
+    integer :: k
+
+    before = self%side
+    do k = 1, n_sides
+      now(k) = side_state_t(position=self%side_position(k, t), clock=t)
+      if (before(k)%moves()) now(k)%velocity = self%side_velocity(k, t)
+    end do
+    call self%specify(box)
+    call self%side%follow(before, now%position, self%epoch + t)
+    self%piston = merge(now, side_state_t(), self%side%is_piston())
+  end subroutine change
+
+  !> Inward displacement of side k from its mean position at a given time.
+  pure function side_position(self, k, t) result(x)
+    class(box_state_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(real64), intent(in) :: t               !! relative to the time origin `epoch` [time]
+    real(real64) :: x                           !! [length]
+
+    x = self%side(k)%position(self%epoch, t, self%piston(k))
+  end function side_position
+
+  !> Inward velocity of side k at a given time.
+  pure function side_velocity(self, k, t) result(v)
+    class(box_state_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(real64), intent(in) :: t               !! relative to the time origin `epoch` [time]
+    real(real64) :: v                           !! [length/time]
+
+    v = self%side(k)%velocity(self%epoch, t, self%piston(k))
+  end function side_velocity
 
   !> Positions of the sides at a given time.
   pure subroutine bounds(box, t, lower, upper)
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     real(real64), intent(in) :: t               !! relative to the time origin `box%epoch` [time]
     real(real64), intent(out) :: lower(2), upper(2)     !! (left, bottom) and (right, top) sides [length]
     real(real64) :: inwards(n_sides)
@@ -32,22 +111,12 @@ contains
     upper = box%upper - inwards([2, 4])
   end subroutine bounds
 
-  !> True for each periodic axis along which the region spans the whole period. Along such an axis
-  !> disks may overlap the edges of the region.
-  pure function spans(region, box) result(yes)
-    real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
-    type(box_t), intent(in) :: box
-    logical :: yes(2)
-
-    yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
-  end function spans
-
   !> Corners of the rectangle available to the centres of disks in a region at a given time. A disk
   !> with its centre in this rectangle is completely inside the region and overlaps no side. This
   !> also holds if a side is displaced from its mean position.
   pure subroutine centre_range(region, box, radius, lower, upper, t)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     real(real64), intent(in) :: radius              !! [length]
     real(real64), intent(out) :: lower(2), upper(2)
     !> Time relative to the time origin `box%epoch`; default: 0 [time].
@@ -57,7 +126,7 @@ contains
     at = 0
     if (present(t)) at = t
     call bounds(box, at, low, high)
-    inset = merge(0.0_real64, radius, spans(region, box))
+    inset = merge(0.0_real64, radius, spans(region, box%box_t))
     lower = max(region([1, 3]), low) + inset
     ! rounding errors must not put `upper` below `lower`
     upper = max(min(region([2, 4]), high) - inset, lower)
@@ -69,7 +138,7 @@ contains
   !> set to zero. Otherwise the bounces between disk and side could become ever shorter, and their
   !> sequence would be infinite.
   pure function side_time(box, disk, side) result(t)
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int32), intent(in) :: side          !! code of the side: 0 left, -1 right, -2 bottom, -3 top
     real(real64) :: t, gap, inset
@@ -92,7 +161,7 @@ contains
 
   !> Time when a disk touches a moving side.
   pure function moving_side_time(box, disk, side, distance) result(t)
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int32), intent(in) :: side          !! code of the side
     real(real64), intent(in) :: distance        !! distance between the disk and the edge of the box [length]
@@ -103,7 +172,7 @@ contains
     v = -sense_of(side)*disk%v(axis)
     g = -sense_of(side)*box%gravity(axis)
     gap = distance
-    associate (motion => box%side(1 - side)%motion, state => box%side(1 - side)%state)
+    associate (motion => box%side(1 - side)%motion, state => box%piston(1 - side))
       since = disk%clock
       if (motion%is_piston()) then              ! the contact must not precede the clock of disk or piston
         since = max(since, state%clock)
@@ -121,7 +190,7 @@ contains
   !> The first side reached by a disk. If the disk reaches two sides at the same time, left precedes
   !> right, and both precede bottom and top.
   pure subroutine next_side(box, disk, t, side)
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: side
@@ -144,7 +213,7 @@ contains
   !> shift the predicted contact of a disk close to the side to a time before `now`. The
   !> displacement of the disk is of the order of these errors.
   pure subroutine separate_from_sides(box, disk, now)
-    type(box_t), intent(in) :: box
+    type(box_state_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk
     real(real64), intent(in) :: now             !! relative to the time origin `box%epoch` [time]
     real(real64) :: step
@@ -162,6 +231,19 @@ contains
     end do
   end subroutine separate_from_sides
 
+  !> Normal velocity of a surface; zero for obstacles, which do not move.
+  pure function normal_surface_velocity(box, code, normal, t) result(u)
+    type(box_state_t), intent(in) :: box
+    integer(int32), intent(in) :: code
+    real(real64), intent(in) :: normal(2)       !! unit vector from the surface to a disk
+    real(real64), intent(in) :: t               !! relative to the time origin `box%epoch` [time]
+    real(real64) :: u(2)                        !! [length/time]
+
+    u = 0
+    if (.not. is_side(code)) return
+    if (allocated(box%side(1 - code)%motion)) u = box%side_velocity(1 - code, t)*normal
+  end function normal_surface_velocity
+
   !> Rounding error of the gap between a disk and a moving side.
   pure function gap_rounding_error(disk, axis, reach) result(gap)
     type(disk_t), intent(in) :: disk
@@ -172,4 +254,4 @@ contains
     gap = relative_error*(abs(disk%x(axis)) + disk%radius + reach)
   end function gap_rounding_error
 
-end module box_sides
+end module box_state
