@@ -283,17 +283,21 @@ contains
     call remove_file(self%path)
   end subroutine discard
 
-  !> Creates a group and all missing groups on its path.
-  subroutine make_group(self, name)
+  !> Creates a group and all missing groups on its path. The group is closed again unless the caller
+  !> requests it open.
+  subroutine make_group(self, name, opened)
     class(hdf5_handle_t), intent(inout) :: self
     character(len=*), intent(in) :: name
+    integer(hid_t), intent(out), optional :: opened      !! the open group; -1 after a failure
     integer(hid_t) :: group
     integer :: status, closed
 
+    if (present(opened)) opened = -1
     if (allocated(self%failure)) return
     call h5gcreate_f(self%id, name, group, status, lcpl_id=self%links)
     call self%check(status, "make group "//name)
-    if (status >= 0) call h5gclose_f(group, closed)
+    if (status >= 0 .and. present(opened)) opened = group
+    if (status >= 0 .and. .not. present(opened)) call h5gclose_f(group, closed)
   end subroutine make_group
 
   !> Adds a second name (a hard link) to an object in the file.

@@ -80,19 +80,22 @@ contains
   end subroutine remove_last
 
   !> Creates a dataset. The dataset is closed again unless the caller requests it open.
-  subroutine make_dataset(self, name, type, extents, opened)
+  subroutine make_dataset(self, name, type, extents, opened, group)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(in) :: type            !! HDF5 type in the file
     integer(hsize_t), intent(in) :: extents(:)    !! shape of the dataset; empty for a single value
     integer(hid_t), intent(out), optional :: opened      !! the open dataset; -1 after a failure
-    integer(hid_t) :: dataset, space
+    integer(hid_t), intent(in), optional :: group !! open group to which `name` is relative
+    integer(hid_t) :: dataset, space, place
     integer :: status, closed
 
     if (present(opened)) opened = -1
     if (allocated(self%failure)) return
     call h5screate_simple_f(size(extents), extents, space, status)
-    if (status >= 0) call h5dcreate_f(self%id, name, type, space, dataset, status, self%storage, self%links)
+    place = self%id
+    if (present(group)) place = group
+    if (status >= 0) call h5dcreate_f(place, name, type, space, dataset, status, self%storage, self%links)
     call self%check(status, "write "//name)
     if (status >= 0 .and. present(opened)) opened = dataset
     if (status >= 0 .and. .not. present(opened)) call h5dclose_f(dataset, closed)

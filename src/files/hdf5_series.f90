@@ -6,8 +6,8 @@
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
-  use hdf5, only: hid_t, hsize_t, h5dclose_f, h5_integer_kind, h5_real_kind, h5kind_to_type, h5t_ieee_f32le, h5t_ieee_f64le, &
-    h5t_std_i32le, h5t_std_i64le
+  use hdf5, only: hid_t, hsize_t, h5dclose_f, h5gclose_f, h5olink_f, h5_integer_kind, h5_real_kind, h5kind_to_type, &
+    h5t_ieee_f32le, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le
   use hdf5_objects, only: hdf5_file_t
   use kinds, only: int32, int64, real64
   use texts, only: written
@@ -32,6 +32,7 @@ module hdf5_series
     integer(hid_t) :: dataset = -1                !! the open dataset
   contains
     procedure :: make
+    procedure :: make_element
     procedure :: find
     procedure :: close => close_series
     procedure :: pass
@@ -108,6 +109,29 @@ contains
     self%capacity = capacity
     call file%make_dataset(trim(self%name), self%storage_type(), int(self%extents(capacity), hsize_t), self%dataset)
   end subroutine make
+
+  !> Creates the series as the value of an H5MD element, with links to the series of its steps and
+  !> times. The group of the element stays open meanwhile, because HDF5 would otherwise search for
+  !> its path three times, which takes long if the file contains thousands of elements.
+  subroutine make_element(self, file, capacity, step, time)
+    class(series_t), intent(inout) :: self        !! its name ends in /value
+    type(hdf5_file_t), intent(inout) :: file
+    integer(int64), intent(in) :: capacity
+    type(series_t), intent(in) :: step, time
+    integer(hid_t) :: group
+    integer :: slash, status(3)
+
+    self%capacity = capacity
+    slash = index(self%name, "/", back=.true.)
+    call file%make_group(self%name(:slash - 1), group)
+    call file%make_dataset(trim(self%name(slash + 1:)), self%storage_type(), int(self%extents(capacity), hsize_t), self%dataset, &
+      group)
+    if (allocated(file%failure)) return
+    call h5olink_f(step%dataset, group, "step", status(1))
+    call h5olink_f(time%dataset, group, "time", status(2))
+    call h5gclose_f(group, status(3))
+    call file%check(minval(status), "link the step and the time of "//trim(self%name))
+  end subroutine make_element
 
   !> Locates the series in a file, where its samples must have the expected shape. The file may
   !> contain 64-bit integers even if 32-bit integers are expected.

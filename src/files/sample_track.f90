@@ -51,7 +51,7 @@ module sample_track
     procedure :: append
     procedure :: flush => flush_buffer
     procedure :: verify
-    procedure, private :: batch, commit, link_step_and_time
+    procedure, private :: batch, commit
   end type track_t
 
 contains
@@ -123,7 +123,8 @@ contains
     end do
   end subroutine widen
 
-  !> Creates the series and the counter in a new file.
+  !> Creates the series and the counter in a new file. H5MD prescribes links between the steps and
+  !> the times of elements that are sampled together.
   subroutine make(self, file, capacity)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -132,29 +133,15 @@ contains
 
     self%capacity = capacity
     do k = 1, size(self%series)
-      call self%series(k)%make(file, capacity)
+      if (k > 3 .and. index(self%series(1)%name, "/step") > 0) then
+        call self%series(k)%make_element(file, capacity, self%series(1), self%series(2))
+      else
+        call self%series(k)%make(file, capacity)
+      end if
       call file%hold(self%series(k)%dataset)
     end do
-    call self%link_step_and_time(file)
     call self%put_counter(file)
   end subroutine make
-
-  !> Links the step and the time of all H5MD elements to the step and the time of the first element.
-  !> H5MD prescribes these links for elements that are sampled together.
-  subroutine link_step_and_time(self, file)
-    class(track_t), intent(in) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    character(len=:), allocatable :: element
-    integer :: k
-
-    if (index(self%series(1)%name, "/step") == 0) return
-    do k = 4, size(self%series)
-      element = trim(self%series(k)%name)
-      element = element(:len(element) - len("value"))
-      call file%link(trim(self%series(1)%name), element//"step")
-      call file%link(trim(self%series(2)%name), element//"time")
-    end do
-  end subroutine link_step_and_time
 
   !> Locates the series in an existing file, to continue after the first `count` samples. The file
   !> is not changed.
