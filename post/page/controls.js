@@ -27,7 +27,7 @@ function prepareFilm() {
   sums = null;
   const alike = s => kinds[s].count >= FEWEST && kinds[s].alike;
   counted = kinds.map((_, s) => s).filter(s => (film.speeds.rest && disks >= FEWEST) || alike(s));
-  $('coming').hidden = $('foretelling').hidden = !film.events;
+  $('coming').hidden = !film.events;
   $('speeds').hidden = !counted.length;
   $('sofar').hidden = film.speeds.rest;
   $('speeds').classList.toggle('rest', film.speeds.rest);

@@ -21,6 +21,7 @@ function tell() {
   $('clock').innerHTML = `<span class="time">t = <b>${long(+moment.shown.toPrecision(5))}</b>${counted ? ' · ' : ended('')}</span>`
     + `<span class="counted">${counted && ended(counted)}</span><span>${count && letter + count}</span>`;
   $('traced').hidden = !state.traced.length;
+  $('foretelling').hidden = !film.events || state.traced.length > 0;  // the buttons of a disk need its place
   $('hint').textContent = state.traced.length ? '' : hint();
   $('push').hidden = !isPart || state.traced.length !== 1 || !isInside(state.traced[0]);
   $('disk').innerHTML = state.traced.map(i =>
