@@ -126,10 +126,12 @@ contains
     call file%make_group(self%name(:slash - 1), group)
     call file%make_dataset(trim(self%name(slash + 1:)), self%storage_type(), int(self%extents(capacity), hsize_t), self%dataset, &
       group)
-    if (allocated(file%failure)) return
-    call h5olink_f(step%dataset, group, "step", status(1))
-    call h5olink_f(time%dataset, group, "time", status(2))
-    call h5gclose_f(group, status(3))
+    status = 0
+    if (.not. allocated(file%failure)) then
+      call h5olink_f(step%dataset, group, "step", status(1))
+      call h5olink_f(time%dataset, group, "time", status(2))
+    end if
+    if (group >= 0) call h5gclose_f(group, status(3))  ! also after a failure: the file could not be closed otherwise
     call file%check(minval(status), "link the step and the time of "//trim(self%name))
   end subroutine make_element
 
