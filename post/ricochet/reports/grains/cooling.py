@@ -59,15 +59,13 @@ def draw_ratio(axes: plt.Axes, groups: list[Group]) -> None:
 def draw_overview(axes: plt.Axes, groups: list[Group], against: str) -> None:
     """Plot energies on a logarithmic axis; for more than `FEW` groups, only those of all disks."""
     shown = styles(groups[0].runs[0])[: 1 if len(groups) > FEW else None]
+    width = 1.8 if len(groups) > FEW else 1.4
     for group in groups:
+        curves = group.values
         for name, style in shown:
-            line, curves = (
-                {"color": group.colour, "ls": style, "lw": 1.4 + 0.4 * (len(groups) > FEW)},
-                group.values,
-            )
             x = curves["time" if against == "time" else "collisions_per_disk"]
             energy = in_time(curves, name) if against == "time" else curves[f"K_{name}"]
-            band(axes, x, *energy, **line)
+            band(axes, x, *energy, color=group.colour, ls=style, lw=width)
             if name == "all":
                 name_curve(axes, x[-1], energy.mean[-1], f"{group.key:g}", group.colour)
     for name, style in shown if len(shown) > 1 else ():
