@@ -42,7 +42,6 @@ AXES = {
     "radius": ("radius of the projectile / radius of a bed disk, $R$", "number"),
     "restitution": ("$1-ξ^2$", "number"),
 }
-SYMBOLS = {"mass": "M", "speed": "v", "radius": "R", "restitution": "(1-ξ^2)"}  # in fits
 SIZES = {"hit": "disks hit", "displaced": "displaced by more than r"}
 EXTENTS = {"width": "width of the displaced", "depth": "depth of the displaced"}
 EXTENTS |= {"hole_width": "width of the hole", "hole_depth": "depth of the hole"}
