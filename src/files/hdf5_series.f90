@@ -131,7 +131,7 @@ contains
       call h5olink_f(step%dataset, group, "step", status(1))
       call h5olink_f(time%dataset, group, "time", status(2))
     end if
-    if (group >= 0) call h5gclose_f(group, status(3))  ! also after a failure: the file could not be closed otherwise
+    if (group >= 0) call h5gclose_f(group, status(3))  ! also after a failure
     call file%check(minval(status), "link the step and the time of "//trim(self%name))
   end subroutine make_element
 
