@@ -199,6 +199,20 @@ def test_every_folder_introduces_its_modules(folder):
     assert [name for name in modules if not re.search(rf"`{name}\b", page)] == []
 
 
+def test_links_to_the_laboratory_set_values_that_the_program_accepts(ricochet):
+    links = {link for page in PAGES for link in re.findall(r"#input=[^)`\s]+", page.read_text())}
+    shown = json.loads((ROOT / "input/chooser.json").read_text())
+    assert len(links) > 8
+    for link in links:
+        name, *settings = link.removeprefix("#input=").split("&")
+        assert name in shown
+        for setting in settings:  # the form knows variables by name, not their elements
+            assert re.fullmatch(r"[\w.]+=[^=]+", setting), link
+        words = [word for one in settings for word in ("--set", one)]
+        done = ricochet(ROOT / f"input/{name}.nml", *words, "--check")
+        assert done.returncode == 0, done.stderr
+
+
 def test_options_that_are_named_exist(program):
     """All options of ricochet in code blocks of the pages exist."""
     known = ran(program, "--help", check=True).stdout
