@@ -27,6 +27,7 @@ from ricochet import RunError
 from ricochet.figures.web_page import INPUTS, chooser, lab_page, view
 from ricochet.pages.lab import Lab, form
 from ricochet.pages.live import application, page_of, serving
+from ricochet.reading.files import similar_file
 from ricochet.running.engine import library
 from ricochet.script import Parser, launch
 
@@ -114,6 +115,8 @@ def main() -> None:
     parser.add_argument("--files", type=Path, action="append", default=[], metavar="DIR", help=more)
     args = parser.parse_args()
     for path in args.inputs:
+        if not path.exists():
+            raise RunError(f"{path}: no such file{similar_file(path, '.nml', Path('input'))}")
         if path.suffix != ".nml" or not path.is_file():
             raise RunError(f"{path}: is not an input file; the name must end in .nml")
     library()  # without it no run could start

@@ -515,7 +515,10 @@ while (($#)); do
 done
 
 [[ -n $input ]] || die "no input file is given, see --help"
-[[ -r $input && -f $input ]] || die "cannot read $input$(nearest "$input" "${input%"${input##*/}"}"*.nml)"
+[[ -r $input && -f $input ]] || die "cannot read $input$(
+  shopt -s nullglob
+  nearest "$input" "${input%"${input##*/}"}"*.nml input/*.nml
+)"
 [[ -n $folder ]] || die "no folder for the members is given: -d FOLDER"
 [[ $folder != -* ]] || folder=./$folder
 [[ $jobs =~ ^[1-9][0-9]{0,5}$ ]] || die "-j $jobs: not a number of members"

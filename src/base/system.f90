@@ -10,7 +10,7 @@ module system
   private
   public :: seconds, talks_to_terminal, end_program, host_name
   public :: move_file, remove_file, make_folders_of, synchronize
-  public :: what_is, identity_of, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t
+  public :: what_is, identity_of, is_folder, folder_of, names_beside, opening_problem, free_bytes, last_problem, lock_t
   public :: file_size, largest_file, read_bytes, read_file, write_word
   public :: fill_standard_streams, print_text, cores_of_process
 
@@ -127,6 +127,14 @@ module system
       character(kind=c_char), intent(out) :: text(*)
       integer(c_size_t), value :: size
     end subroutine c_opening_problem
+
+    function c_list_names(folder, ending, names, width, most) bind(C, name="system_list_names") result(count)
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: folder(*), ending(*)
+      character(kind=c_char), intent(out) :: names(*)
+      integer(c_int), value :: width, most
+      integer(c_int) :: count
+    end function c_list_names
 
     subroutine c_unlock(path, descriptor) bind(C, name="system_unlock")
       import :: c_char, c_int
@@ -319,6 +327,16 @@ contains
     folder = path(:index(path, "/", back=.true.))
     if (folder == "") folder = "."
   end function folder_of
+
+  !> Names of the files with an ending such as `.nml` in the folder of a file, in alphabetical order
+  !> and without the ending. Long names, and names beyond the first 1000, are left out.
+  function names_beside(path, ending) result(names)
+    character(len=*), intent(in) :: path, ending
+    character(len=64, kind=c_char), allocatable :: names(:)
+
+    allocate (names(1000))
+    names = names(:c_list_names(folder_of(path)//c_null_char, ending//c_null_char, names, len(names), size(names)))
+  end function names_beside
 
   !> Free space for a file in the file system of its (possibly missing) folder, in bytes; a huge
   !> number if the free space is unknown.

@@ -2,6 +2,7 @@
    Fortran interfaces of these functions are in system.f90. After a failure, a function returns -1 and errno
    contains the reason. */
 #define _GNU_SOURCE
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -209,6 +210,25 @@ static int open_regular(const char *path, int flags, const char **problem)
     close(descriptor);
     errno = EINVAL;
     return -1;
+}
+
+/* Names of the files of a folder that have the given ending, without it, in alphabetical order. Each name is padded with
+   blanks to `width`; longer names are left out. Returns the number of names, at most `most`; 0 if there is no folder. */
+int system_list_names(const char *folder, const char *ending, char *names, int width, int most)
+{
+    struct dirent **entry;
+    const int entries = scandir(folder, &entry, NULL, alphasort);
+    int count = 0;
+    memset(names, ' ', (size_t)width*(size_t)most);
+    for (int k = 0; k < entries; k++) {
+        const char *name = entry[k]->d_name;
+        const size_t length = strlen(name), stem = length - strlen(ending);
+        if (length > strlen(ending) && strcmp(name + stem, ending) == 0 && stem <= (size_t)width && count < most)
+            memcpy(names + (size_t)width*(size_t)count++, name, stem);
+        free(entry[k]);
+    }
+    if (entries >= 0) free(entry);
+    return count;
 }
 
 /* Reason why a file cannot be opened for reading or, with `writable`, for writing; empty if it can. */

@@ -6,8 +6,8 @@
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
-  use system, only: file_size, is_folder, read_file
-  use texts, only: byte_order_mark, digits, eol, letters, shown, written
+  use system, only: file_size, is_folder, names_beside, read_file
+  use texts, only: byte_order_mark, digits, eol, letters, nearest_word, shown, written
   implicit none
   private
   public :: read_text, unix_lines
@@ -96,20 +96,24 @@ contains
     is_hdf5 = status == 0 .and. start == hdf5_signature
   end function is_hdf5
 
-  !> Suggests an existing input file if the path only lacks the extension or the folder `input`.
+  !> Suggests the input file with the most similar name, in the folder of the path or in the folder
+  !> `input`.
   function advice(path)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: advice
-    integer :: k
+    character(len=*), parameter :: extension = ".nml", inputs = "input/"
+    character(len=:), allocatable :: name
 
-    do k = 1, 3
-      advice = path
-      if (k > 1) advice = "input/"//advice
-      if (k /= 2) advice = advice//".nml"
-      if (file_size(advice) > 0) exit
-      advice = ""
-    end do
-    if (advice /= "") advice = "; did you mean "//advice//"?"
+    name = path(index(path, "/", back=.true.) + 1:)
+    if (index(name//"|", extension//"|") > 0) name = name(:len(name) - len(extension))
+    associate (known => [names_beside(path, extension), names_beside(inputs, extension)])
+      advice = nearest_word(name, known)
+      if (advice == "") advice = nearest_word(name(:index(name, ".", back=.true.) - 1), known)
+    end associate
+    if (advice == "") return
+    name = path(:index(path, "/", back=.true.))//advice//extension
+    if (file_size(name) < 0) name = inputs//advice//extension
+    advice = "; did you mean "//name//"?"
   end function advice
 
   !> Normalises the line ends of a text to line feeds, and removes a byte order mark.

@@ -222,7 +222,7 @@ def test_wrong_words_are_refused_in_one_line(address, program, monkeypatch, caps
     port = address.split(":")[2][:-1]
     for words, reason in (
         (["--port", "99999"], "is not a port"),
-        ([tmp_path / "none.nml"], "is not an input file"),
+        (["inpt/gas.nml"], "inpt/gas.nml: no such file; did you mean input/gas.nml?"),
         ([ROOT / "README.md"], "is not an input file"),
         (["--port", port], f"lab.py: port {port}: Address already in use\n"),
     ):

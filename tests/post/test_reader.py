@@ -199,6 +199,7 @@ def bad_files(folder) -> dict[str, str]:
     (folder / "short.h5").write_bytes(data[: len(data) // 2])
     (folder / "empty.h5").touch()
     (folder / "text.h5").write_text("no HDF5 at all\n" * 100)
+    (folder / "input.nml").write_text("&run /\n")
     (folder / "unfinished.h5.part").touch()
     with h5py.File(folder / "foreign.h5", "w") as file:
         file["x"] = 1
@@ -211,6 +212,7 @@ def bad_files(folder) -> dict[str, str]:
         "empty.h5": "empty",
         "text.h5": "not an HDF5",
         "short.h5": "cut short",
+        "input.nml": "is an input file; give its output: build/ricochet",
         "foreign.h5": "not of a Ricochet run",
         "future.h5": "version 2.0",
         "partial.h5": "not laid out as a Ricochet run",
@@ -483,6 +485,9 @@ def test_results_are_written_into_files_of_ones_own(
         ("haff run.h5 --out a.png", "unknown argument --out; did you mean --output?"),
         ("haff run.h5 -o a.png --csv ./a.png", "a.png is the name of the figure, too"),
         ("snapshot rum.h5", "no such file; did you mean run.h5?"),
+        ("snapshot runs/odl.h5", "no such file; did you mean runs/old.h5?"),
+        ("snapshot odl", "no such file; did you mean runs/old.h5?"),
+        ("snapshot xyz.h5", "xyz.h5: no such file\n"),
         ("snapshot run.h5 --frames 0,a", "'0,a' is not a list"),
         ("snapshot run.h5 --frames ::0", "'::0' is not a list"),
         ("snapshot run.h5 --frames 0:1:1:1", "'0:1:1:1' is not a list"),
@@ -500,6 +505,8 @@ def test_results_are_written_into_files_of_ones_own(
 def test_a_wrong_word_is_answered_by_the_right_one(small, monkeypatch, capsys, wrong, words):
     monkeypatch.chdir(small.parent)
     small.rename("run.h5")
+    Path("runs").mkdir()
+    Path("runs/old.h5").touch()
     assert run_script(*wrong.split()) == 2
     said = capsys.readouterr().err
     assert words in said and "Traceback" not in said

@@ -11,9 +11,9 @@ from pathlib import Path
 import fuzz_input
 import pytest
 from ricochet.running.program import namelist
-from whole_runs import FILES, FINISHED, USAGE
+from synthetic_run import ROOT
+from whole_runs import FILES, FINISHED, USAGE, ran
 
-ROOT = Path(__file__).resolve().parents[2]
 INPUTS = sorted((ROOT / "input").glob("*.nml"))
 OTHERS = """&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /
 &wall name = 'ramp' from = 0.1, 0.1 to = 0.3, 0.2 /
@@ -210,13 +210,21 @@ def test_an_override_may_set_one_element_of_a_vector(ricochet, tmp_path):
     assert box == [{"upper": [4, 3], "boundary": ["periodic", "wall"]}]
 
 
-def test_a_file_that_is_not_there_may_be_meant_without_its_ending(ricochet, tmp_path):
+def test_a_missing_file_is_answered_by_the_nearest_name_in_its_folder_or_in_input(
+    ricochet, tmp_path
+):
     (tmp_path / "input").mkdir()
     (tmp_path / "input" / "gas.nml").write_text(GOOD)
-    for word in ("gas", "gas.nml", "input/gas"):
+    (tmp_path / "input" / "notes.txt").touch()
+    for word in ("gas", "gas.nml", "input/gas", "input/gsa.nml", "inpt/gas.nml", "runs/gas.h5"):
         said = ricochet(word, "--check").stderr
         assert said == f"{word}: there is no such file; did you mean input/gas.nml?\n"
-    assert ricochet("input/gsa").stderr == "input/gsa: there is no such file\n"
+    for word in ("input/zebra.nml", "notes.txt"):
+        assert ricochet(word).stderr == f"{word}: there is no such file\n"
+    ensemble = ran(ROOT / "runs" / "ensemble.sh", "inpt/gas.nml", "-d", "d", cwd=tmp_path)
+    assert ensemble.stderr.endswith("cannot read inpt/gas.nml; did you mean input/gas.nml?\n")
+    (tmp_path / "gas.nml").write_text(GOOD)
+    assert "did you mean gas.nml?" in ricochet("gsa.nml").stderr
 
 
 def test_every_default_that_is_printed_may_be_written_into_a_file(ricochet, tmp_path):

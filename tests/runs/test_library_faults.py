@@ -16,6 +16,7 @@ import pytest
 
 from library_systems import ENDLESS, GAS
 from ricochet import ProgramError, RunError, Simulation
+from synthetic_run import ROOT
 
 RESTING = {"species": {"count": 9, "radius": 0.1, "velocities": "rest"}}
 SHEARED = {"box": {"boundary": ["periodic", "periodic"], "shear_rate": 1}}
@@ -105,6 +106,7 @@ def kept(system) -> Simulation:
         (lambda _: Simulation(GAS, threads=0), ValueError, "from 1 to 1024"),
         (lambda _: Simulation.load("no.h5", threads=1.5), ValueError, "not 1.5"),
         (lambda _: Simulation(None), TypeError, "its text"),
+        (lambda _: Simulation(f"{ROOT}/input/gsa.nml"), ProgramError, "input/gas.nml?"),
         (lambda _: Simulation("&species count = -1 radius = 1 /"), ProgramError, "from 1 to"),
         (lambda gas: gas.save("/proc/none/x.h5"), ProgramError, "/proc/none"),
         (lambda gas: gas.advance(events=9).advance(events=8), ValueError, "8 has passed"),

@@ -59,8 +59,7 @@ def hdf5_file(path: Path) -> h5py.File:
     if not path.exists():
         part = Path(f"{path}.part")
         hint = f", but there is {part} of an unfinished run" if part.exists() else None
-        hint = hint or did_you_mean(str(path), map(str, path.parent.glob("*.h5*")))
-        raise RunError(f"{path}: no such file{hint}")
+        raise RunError(f"{path}: no such file{hint or similar_file(path, '.h5', Path('runs'))}")
     if not path.is_file():  # opening a FIFO would block
         raise RunError(f"{path}: is a {'folder' if path.is_dir() else 'device'}, not a run")
     try:
@@ -71,6 +70,9 @@ def hdf5_file(path: Path) -> h5py.File:
         if "locking flag" in str(problem) or "already open" in str(problem):
             why = "this process has opened it with another mode or lock; close it there first"
             raise RunError(f"{path}: {why}") from None
+        if path.suffix == ".nml":
+            command = f"build/ricochet {path} writes runs/{path.stem}.h5"
+            raise RunError(f"{path}: is an input file; give its output: {command}") from None
         if not path.exists():  # just removed, or renamed by the program
             raise RunError(f"{path}: no such file") from None
         state = "is empty" if path.stat().st_size == 0 else "is not an HDF5 file, or is cut short"
@@ -82,10 +84,30 @@ def did_you_mean(word: str, others: Iterable[str]) -> str:
 
     If no word is similar, the shortest one that contains `word` is suggested.
     """
-    known = list(others)
+    return "".join(f"; did you mean {name}?" for name in nearest(word, list(others)))
+
+
+def nearest(word: str, known: list[str]) -> list[str]:
+    """Return the most similar word, or else the shortest that contains `word`, as a list."""
     longer = [other for other in known if len(word) > 2 and word.lower() in other.lower()]
-    near = get_close_matches(word, known, 1) or sorted(longer, key=len)[:1]
-    return "".join(f"; did you mean {name}?" for name in near)
+    return get_close_matches(word, known, 1) or sorted(longer, key=len)[:1]
+
+
+def similar_file(path: Path, ending: str, usual: Path) -> str:
+    """Return a question that suggests the file whose name is most similar to a missing one's.
+
+    Files with the `ending`, or that of an unfinished output, are considered in the folder of `path`
+    and in the `usual` folder.
+    """
+    there = [
+        file
+        for folder in (usual, path.parent)
+        for end in (f"{ending}.part", ending)
+        for file in sorted(folder.glob(f"*{end}"))
+    ]
+    files = {file.name.partition(ending)[0]: file for file in there}
+    near = nearest(path.name.partition(ending)[0], [*files])
+    return "".join(f"; did you mean {files[name]}?" for name in near)
 
 
 def counted(number: int, noun: str) -> str:

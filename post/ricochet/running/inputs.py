@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
+from ..reading.files import similar_file
 from .engine import c_text
 from .program import ProgramError, unseen
 
@@ -16,6 +17,9 @@ def read_input(system: str | Path | Mapping[str, Any], place: Path | None = None
         return text
     try:
         return Path(cast(str, system)).read_text(encoding="utf-8", errors="surrogateescape")
+    except FileNotFoundError:
+        hint = similar_file(Path(cast(str, system)), ".nml", Path("input"))
+        raise ProgramError(f"{system}: there is no such file{hint}", 3) from None
     except OSError as error:
         raise ProgramError(f"{system}: cannot be read: {error.strerror}", 3) from error
 
