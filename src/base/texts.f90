@@ -5,7 +5,7 @@ module texts
   implicit none
   private
   public :: text_t, growing_text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
-  public :: about, counted, line_at, lines_of, size_text, wrapped
+  public :: about, counted, did_you_mean, line_at, lines_of, size_text, wrapped
 
   !> String of any length; an array of this type is a list of strings.
   type :: text_t
@@ -206,23 +206,35 @@ contains
     place = 0
   end function place_of
 
-  !> Advice about a misspelt word: the most similar known word, or else a list of the known words.
-  pure function suggestion(word, known, listed) result(advice)
+  !> Advice about a misspelt word: the most similar known word, and how to see all known words, or a
+  !> list of them. A long list appears only if no known word is similar.
+  pure function suggestion(word, known, listed, to_see_all) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
-    !> Words listed instead of `known` if no known word is similar.
-    character(len=*), intent(in), optional :: listed(:)
+    character(len=*), intent(in), optional :: listed(:)     !! words listed instead of `known`
+    character(len=*), intent(in), optional :: to_see_all    !! option of the program that lists `known`
     character(len=:), allocatable :: advice
+    integer, parameter :: longest_list = 20
 
     advice = nearest_word(word, known)
-    if (advice /= "") then
-      advice = "did you mean """//advice//"""?"
-    else if (present(listed)) then
+    if (advice /= "") advice = did_you_mean(""""//advice//"""")
+    if (advice /= "" .and. present(to_see_all)) then
+      advice = advice//" "//to_see_all//" lists all"
+    else if (advice == "" .and. present(listed)) then
       advice = "known: "//joined(listed, ", ")
-    else
-      advice = "known: "//joined(known, ", ")
+    else if (advice == "" .or. size(known) <= longest_list) then
+      advice = advice//" known: "//joined(known, ", ")
     end if
+    advice = trim(adjustl(advice))
   end function suggestion
+
+  !> Question that suggests a word, or several in one text.
+  pure function did_you_mean(text) result(question)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: question
+
+    question = "did you mean "//text//"?"
+  end function did_you_mean
 
   !> Known word that was probably meant by `word`. A known word is suggested if it starts with
   !> `word`, or if it differs from `word` in at most a third of the letters. The result is empty if

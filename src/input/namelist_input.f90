@@ -5,11 +5,11 @@ module namelist_input
   use input_problems, only: most_problems, problem_list_t
   use input_words, only: store_values
   use input_text, only: assignment_t, content, cut, ending, plain, split_element, token_t, unclosed, unix_lines, word
-  use looked_up_words, only: meant_variables
+  use looked_up_words, only: advice_about
   use partners, only: n_sides, side_name
   use old_names, only: new_name
-  use texts, only: digits, eol, joined, lower_case, nearest_word, shown, suggestion, text_t, written
-  use variables, only: full_names, group_names, is_repeated, obstacle_groups, row_of, table, track_of, variables_of
+  use texts, only: did_you_mean, digits, eol, joined, lower_case, nearest_word, shown, suggestion, text_t, written
+  use variables, only: group_names, is_repeated, obstacle_groups, row_of, table, track_of, variables_of
   implicit none
   private
   public :: override_groups, read_groups
@@ -406,7 +406,6 @@ contains
   subroutine enter_group(self, name)
     class(reader_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    character(len=:), allocatable :: advice
     integer :: instances, g
 
     self%own = plain(name)
@@ -418,9 +417,7 @@ contains
     if (self%group > 0) instances = self%found(self%group)%number
     if (all(group_names /= name)) then
       self%complete = .false.
-      advice = suggestion(name, group_names)
-      if (full_names(name) /= "") advice = "did you mean "//full_names(name)//"?"
-      call self%problems%add(self%opened, "&"//self%own, "unknown group; "//advice)
+      call self%problems%add(self%opened, "&"//self%own, "unknown group; "//advice_about(name, suggestion(name, group_names)))
     else if (.not. is_repeated(name)) then
       if (self%found(self%group)%line > 0) call self%problems%add(self%opened, name, &
         "a second group of this name; the first is in line "//written(self%found(self%group)%line))
@@ -449,9 +446,7 @@ contains
     associate (group => self%found(self%group))
       row = row_of(group%name, name)
       if (row == 0) then
-        call self%report_unknown(group%name, name, assignment%line)
-        row = row_of(group%name, nearest_word(name, variables_of(group%name)))
-        if (row > 0) call count_as_faulty(group%values(row))
+        call self%report_unknown(trim(group%name), name, assignment%line, self%group)
         return
       end if
       elements = -1
@@ -465,36 +460,34 @@ contains
         end if
       end associate
     end associate
-  contains
-
-    !> Of a variable whose misspelt name was reported it is not said that it is missing, too.
-    subroutine count_as_faulty(slot)
-      type(value_t), intent(inout) :: slot
-
-      if (slot%given) return
-      slot%line = assignment%line
-      slot%given = .true.
-      slot%faulty = .true.
-    end subroutine count_as_faulty
   end subroutine take_assignment
 
   !> Reports an unknown variable. The message suggests the correct name if the variable is misspelt,
-  !> was renamed, or belongs to another group.
-  subroutine report_unknown(self, group, name, line)
+  !> was renamed, or belongs to another group. A misspelt or renamed variable is marked as faulty.
+  !> Therefore it is not also reported as missing.
+  subroutine report_unknown(self, group, name, line, g)
     class(reader_t), intent(inout) :: self
     character(len=*), intent(in) :: group, name
     integer, intent(in) :: line
-    character(len=:), allocatable :: advice
+    integer, intent(in) :: g                            !! index of the group; 0 if unknown
+    character(len=:), allocatable :: meant, problem
+    integer :: row
 
-    advice = new_name(group, name, "")
-    if (advice /= "") then
-      call self%problems%add(line, trim(group)//"."//plain(name), "is called "//advice//" now")
-      return
+    meant = new_name(group, name, "")
+    problem = "is called "//meant//" now"
+    if (meant == "") then
+      meant = nearest_word(name, variables_of(group))
+      problem = "unknown variable; "//advice_about(name, suggestion(name, variables_of(group), to_see_all="--explain "//group))
     end if
-    advice = suggestion(name, variables_of(group))
-    if (full_names(name) /= "") advice = "did you mean "//full_names(name)//"?"
-    if (size(meant_variables(name)) > 0) advice = "did you mean "//joined(meant_variables(name), " or ")//"?"
-    call self%problems%add(line, trim(group)//"."//plain(name), "unknown variable; "//advice)
+    call self%problems%add(line, group//"."//plain(name), problem)
+    row = row_of(group, meant)
+    if (g == 0 .or. row == 0) return
+    associate (slot => self%found(g)%values(row))
+      if (slot%given) return
+      slot%line = line
+      slot%given = .true.
+      slot%faulty = .true.
+    end associate
   end subroutine report_unknown
 
   !> Applies an override `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`. VARIABLE may be an
@@ -517,19 +510,16 @@ contains
     call split_element(name, element)
     row = row_of(group, name)
     if (group == "" .or. name == "") then
-      advice = ", as in run.seed=7"
-      if (full_names(name) /= "") advice = "; did you mean "//full_names(name)//"?"
-      call self%problems%add(line, "override", "expects GROUP.VARIABLE=VALUE"//advice)
+      call self%problems%add(line, "override", "expects GROUP.VARIABLE=VALUE; "//advice_about(name, "an example is run.seed=7"))
     else if (all(group_names /= group)) then
       advice = suggestion(group, group_names)
       g = findloc(self%found(:self%n)%instance, text(:first - 1), dim=1)
-      if (g > 0) advice = "did you mean "//trim(self%found(g)%name)//"."//text(:equals - 1)//"?"
+      if (g > 0) advice = did_you_mean(trim(self%found(g)%name)//"."//text(:equals - 1))
       call self%problems%add(line, plain(group), "unknown group; "//advice)
-    else if (row == 0) then
-      call self%report_unknown(group, name, line)
     else
       call self%find_group(group, instance, line, g)
-      if (g == 0) return
+      if (row == 0) call self%report_unknown(group, name, line, g)
+      if (row == 0 .or. g == 0) return
       if (equals == len(text) .and. element == 0) then
         self%found(g)%values(row) = self%defaults(self%found(g)%values(row)%row)
       else

@@ -1,10 +1,11 @@
 !> Words that users look up although no variable has this name, and the variables that they probably
 !> mean.
 module looked_up_words
-  use texts, only: lower_case
+  use texts, only: did_you_mean, joined, lower_case
+  use variables, only: full_names
   implicit none
   private
-  public :: looked_up, looked_up_word_t, meant_variables, word_length
+  public :: advice_about, looked_up, looked_up_word_t, meant_variables, word_length
 
   !> Largest length of a word, and of a full name of a variable
   integer, parameter :: word_length = 24
@@ -39,5 +40,20 @@ contains
       if (looked_up(k)%word == lower_case(word)) names = pack(looked_up(k)%meant, looked_up(k)%meant /= "")
     end do
   end function meant_variables
+
+  !> Advice about an unknown name: the variables that a user means by it, or the variables of this
+  !> name, or else `otherwise`.
+  pure function advice_about(name, otherwise) result(advice)
+    character(len=*), intent(in) :: name, otherwise
+    character(len=:), allocatable :: advice
+
+    advice = full_names(name)
+    if (size(meant_variables(name)) > 0) advice = joined(meant_variables(name), " or ")
+    if (advice /= "") then
+      advice = did_you_mean(advice)
+    else
+      advice = otherwise
+    end if
+  end function advice_about
 
 end module looked_up_words

@@ -252,10 +252,11 @@ def test_all_problems_come_at_once_and_the_last_line_says_so_too(checked):
     run = checked("&species massa = 1 radius = -1 count = 2 /\n&stop tme = 1 /\n", "--set", "a=b")
     lines = lines_of(run)
     assert run.returncode == USAGE
+    mass = 'did you mean "mass"? --explain species lists all'
     assert lines[:3] == [
-        'gas.nml:1: species.massa: unknown variable; did you mean "mass"?',
+        f"gas.nml:1: species.massa: unknown variable; {mass}",
         'gas.nml:1: species.radius: "-1" is out of range; allowed: a number > 0',
-        'gas.nml:2: stop.tme: unknown variable; did you mean "time"?',
+        'gas.nml:2: stop.tme: unknown variable; did you mean "time"? --explain stop lists all',
     ]
     assert lines[-1].startswith("--set a=b: ")
 
@@ -278,8 +279,20 @@ def test_a_misspelt_variable_is_not_said_to_be_missing(checked, group, variables
         names = [typo if other == name else other for other in variables]
         given = " ".join(f"{n} = {v}" for n, v in zip(names, variables.values(), strict=True))
         rest = "&stop events = 1 /" if group == "species" else GOOD
+        advice = f'did you mean "{name}"? --explain {group} lists all'
+        wrong = f"{group}.{typo}: unknown variable; {advice}"
         said = lines_of(checked(f"&{group} {given} /\n{rest}"))
-        assert said == [f'gas.nml:1: {group}.{typo}: unknown variable; did you mean "{name}"?']
+        assert said == [f"gas.nml:1: {wrong}"]
+        given = " ".join(f"{n} = {v}" for n, v in variables.items() if n != name)
+        option = f"{group}.{typo}={variables[name]}"
+        said = lines_of(checked(f"&{group} {given} /\n{rest}", "--set", option))
+        assert said == [f"--set {option}: {wrong}"]
+
+
+def test_a_renamed_variable_is_not_said_to_be_missing(checked):
+    drive = "&drive kind = 'active' interval = 1 temperature = 1 speed = 2 /\n"
+    said = lines_of(checked(drive + GOOD))
+    assert said == ["gas.nml:1: drive.speed: is called self_propulsion_speed now"]
 
 
 @pytest.mark.parametrize(
