@@ -156,7 +156,10 @@ function buildVariable(key) {
   return row;
 }
 
-function sync() { for (const row of document.querySelectorAll('.slider, .variable')) row.sync(); }
+function sync() {
+  for (const row of document.querySelectorAll('.slider, .variable')) row.sync();
+  $('ends').textContent = stopInWords();
+}
 
 function addGroup(kind, name) {
   state.added.push([kind, name]);

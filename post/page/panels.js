@@ -16,7 +16,7 @@ function tell() {
   markChanges();
   $('scrub').setAttribute('aria-valuetext', `time ${short(time)} of ${short(last())}`);
   const letter = isPart && parent.isComparing() ? `${parent.letterOf(window)}: ` : '', counted = source.counted();
-  const count = film.isOpen ? `${sumOf(moment.inside)} disks inside` : disks > 1 ? `${numbered(+collisions.toPrecision(3), 'collision')} per disk` : '';
+  const count = film.isOpen ? `${sumOf(moment.inside)} disks inside` : film.endsByEnergy ? energyLeft() : disks > 1 ? `${numbered(+collisions.toPrecision(3), 'collision')} per disk` : '';
   const ended = text => text + (count && ' · ');  // films beside others show only the last part, because all have the same time
   $('clock').innerHTML = `<span class="time">t = <b>${long(+moment.shown.toPrecision(5))}</b>${counted ? ' · ' : ended('')}</span>`
     + `<span class="counted">${counted && ended(counted)}</span><span>${count && letter + count}</span>`;
@@ -26,6 +26,12 @@ function tell() {
   $('push').hidden = !isPart || state.traced.length !== 1 || !isInside(state.traced[0]);
   $('disk').innerHTML = state.traced.map(i =>
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) ${isInside(i) ? `at <b>${short(X[i])}, ${short(Y[i])}</b>` : 'is outside'}`).join('<br>');
+}
+
+// Returns the remaining kinetic energy in words. Runs that end at a fraction of their energy are compared at equal fractions.
+function energyLeft() {
+  const total = means => sumOf(kinds.map(({ count }, s) => count * means[s])), start = total(source.curves().kinetic.map(([first]) => first));
+  return start > 0 ? `${short(+(100 * total(moment.kinetic) / start).toPrecision(3))} % of the energy left` : '';
 }
 
 // Marks on the time line the times at which the run was changed. An element behind the slider shows the marks, because browsers

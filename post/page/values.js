@@ -54,6 +54,17 @@ function inWords([key, value]) {
   return `${slider ? slider.words.replace(/ \(.*/, '') : phraseOf(key)} = ${valueInWords(shown)}`;
 }
 
+// Returns the stop rules of the input in words. The laboratory itself ignores them.
+const STOPS = {
+  time: value => `until t = ${value}`, energy_fraction: value => `until ${short(100 * value)} % of the energy is left`,
+  collisions_per_disk: value => `for ${value} collisions per disk`, collisions: value => `for ${value} collisions`,
+  events: value => `for ${value} events`, disks_inside: value => `until ${value} disks are inside`, at_rest: () => 'until all disks rest',
+};
+function stopInWords() {
+  const rules = Object.keys(STOPS).filter(name => textOf(`stop.${name}`)).map(name => STOPS[name](textOf(`stop.${name}`)));
+  return rules.length ? `Here a run has no end. The input file ends it: ${rules.join(' or ')}.` : '';
+}
+
 // Returns the changes of a run in words. The variables of a group that was added are not listed.
 function settingsInWords() {
   const isOfAdded = key => state.added.some(([kind, name]) => placeOf(key) === `${kind}.${name}`);

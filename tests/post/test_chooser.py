@@ -72,7 +72,11 @@ def test_the_links_of_a_lesson_lead_to_the_inputs_with_these_titles(page, inputs
         assert key == "input" and title in (f"*{own['title']}*", "this state")
         assert bool(settings) == (title == "this state")
         for variable, value in settings:
-            low, high, *_ = sliders[variable]
-            assert low <= float(value) <= high
+            parts = [*enumerate(value.split(","))]
+            names = {f"{variable}[{k}]": part for k, part in parts} if parts[1:] else {variable: value}
+            assert names.keys() & sliders.keys()
+            for one in names.keys() & sliders.keys():
+                low, high, *_ = sliders[one]
+                assert low <= float(names[one]) <= high
         shown.add(name)
     assert shown == inputs

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from laboratory_page import inside, moving, slide, type_at
+from ricochet import Simulation
 from sampling import mostly
+from synthetic_run import ROOT
 from whole_runs import wait_for
 
 
@@ -312,3 +314,24 @@ def test_compared_craters_show_how_many_disks_are_at_rest(opened):
     text = "filmOf(current()).document.getElementById('bars')"
     words = "/^At rest: A: [0-9]+ of 2000 bed, .*; B: [0-9]+ of 2000 bed/"
     opened.until(f"return {words}.test({text}.innerText)")
+
+
+def test_an_impact_shows_the_energy_left_the_disks_at_rest_and_when_its_input_ends(opened):
+    opened.resize(1366, 768)
+    opened.run("choose('crater')")
+    opened.until("return !busy && !!textOf('stop.energy_fraction')")
+    wait_for(lambda: inside(opened, "stream.run") == opened.run("return current().run"))
+    wait_for(lambda: inside(opened, "moment.time") > 0.06)
+    opened.press("p")
+    wait_for(lambda: not inside(opened, "state.playing"))
+    opened.draw(3)
+    with Simulation(ROOT / "input/crater.nml") as same:
+        start = same.observable("all/kinetic_energy")
+        same.advance(time=inside(opened, "moment.time"))
+        left = 100 * same.observable("all/kinetic_energy") / start
+    text = opened.run("return filmOf(current()).document.getElementById('clock').textContent")
+    assert float(text.split(" · ")[-1].removesuffix(" % of the energy left")) == pytest.approx(
+        left, rel=6e-3
+    )
+    assert opened.run("return filmOf(current()).document.getElementById('bars').offsetHeight") > 0
+    assert opened.run("return $('ends').textContent").endswith("until 10 % of the energy is left.")

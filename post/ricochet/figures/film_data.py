@@ -284,6 +284,7 @@ def scene(run: Run) -> tuple[dict, dict]:
         "recycling": "recycled" in run.nature,
         "jumps": bool(run.nature & JUMPING),
         "isOpen": "open" in run.nature,
+        "endsByEnergy": run.parameter("stop", "energy_fraction") is not None,
         "sources": [*run.parameters.get("source", {})],
         "gravity": run.gravity.tolist(),
         "lower": run.bounds[0].tolist(),
