@@ -13,7 +13,7 @@ function bounce(value) { set('contact.restitution', String(value)); }
 // Returns a message about two overlapping disks with the numbers that the picture shows. The program numbers the disks of each
 // species, and names the species of only one of them.
 function withDisksOfPicture(text) {
-  const [, x, y, other] = text.match(/^disk 1 at (\S+), (\S+) overlaps disk 1 of "(.+)"$/) ?? [], names = namesOfSpecies();
+  const [, x, y, other] = text.match(/(?:^|: )disk 1 at (\S+), (\S+) overlaps disk 1 of "(.+)"$/) ?? [], names = namesOfSpecies();
   const own = names.findIndex(name => name !== other && [x, y].every((one, k) => numberOf(`species.${name}.position`, k) === +one)), pair = [own, names.indexOf(other)].sort();
   const isFew = names.every(name => textOf(`species.${name}.position`) && ['', '1'].includes(textOf(`species.${name}.count`)));
   return other && isFew && pair[0] >= 0 ? `disk ${pair[0] + 1} would overlap disk ${pair[1] + 1}` : text;

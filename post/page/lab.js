@@ -196,7 +196,10 @@ async function choose(name, settings = {}) {
   state.groups = form.groups;
   if (!isPlain) begin(settings);
   $('about').replaceChildren(...form.about.split(/\n\n+/).map(text => make('p', { textContent: text })));
-  $('sliders').replaceChildren(...state.input.sliders.map(buildSlider));
+  $('about').parentElement.hidden = !form.about;
+  const noSliders = make('p', { textContent: 'Your own inputs have no sliders. All their variables are below, under Everything.' });
+  $('sliders').replaceChildren(...(state.input.sliders.length ? state.input.sliders.map(buildSlider) : [noSliders]));
+  $('scanning').hidden = !state.input.sliders.length;
   $('scanned').replaceChildren(...state.input.sliders.map((slider, k) => new Option(slider.words, k)));
   buildEverything();
   sync();
@@ -318,7 +321,8 @@ function ready() { busy = 0; if (again) run(); }
 
 // Shows each error message once: beside the variable that caused the error or, if the message names no variable, beside the
 // variable that the user changed last. The refused text stays in the form while the variable keeps its old value. A change made in
-// the picture is undone, and the line at the top shows the reason. All changes without errors take effect.
+// the picture is undone, and the line at the top shows the reason. All changes without errors take effect. If no value was changed
+// and the input file itself cannot run, all messages appear in the place of the film.
 function showProblems(problems) {
   const changes = () => Object.keys({ ...state.has, ...state.settings }).filter(differs), before = changes();
   let undone = null;
@@ -331,7 +335,9 @@ function showProblems(problems) {
     if (key in state.has) state.settings[key] = state.has[key]; else delete state.settings[key];
   }
   sync();
-  tell(undone ?? (before.length ? IMPOSSIBLE : problems[0].text), true);
+  const lines = problems.map(({ place, text }) => place ? `${place}: ${text}` : text), isOfFile = !before.length && !state.started;
+  if (isOfFile) filmOf(current()).refuse(lines);
+  tell(undone ?? (before.length ? IMPOSSIBLE : isOfFile ? 'This input cannot run. Correct the file, then start over.' : lines.join('\n')), true);
   toAddress();
   again ||= before.length > 0 && (changes().length > 0 || !state.started || !current().run);
 }

@@ -24,6 +24,14 @@ function talk(wish, heard) {
 }
 
 function starts(on) { document.documentElement.classList.toggle('starting', on); }
+const PLACING_TEXT = $('starting').textContent;
+
+// Shows, in the place of the film, why there is none.
+function refuse(lines) {
+  $('starting').textContent = lines.join('\n');
+  document.documentElement.classList.add('empty', 'refused');
+}
+
 function isStarting() { return document.documentElement.classList.contains('starting'); }
 
 // Starts the run requested by the user of the laboratory. All runs of this film share a connection to one worker process.
@@ -32,6 +40,8 @@ function start(run) {
   if (!same) [stream.sent, usual] = [0, usual || !!stream.wish];
   stream.wish = run;
   starts(true);
+  $('starting').textContent = PLACING_TEXT;
+  document.documentElement.classList.remove('refused');
   if (stream.socket?.readyState === 1) { send(wish); return; }
   stream.socket = talk(wish, news => {
     hear[news.is]?.(news);
@@ -112,7 +122,11 @@ const hear = {
     starts(false);
     if (past.length && !state.playing) show(moment.time, true);  // a refused disk or arrow returns to its place
   },
-  gone() { starts(false); stream.ended = true; },
+  gone({ problems }) {
+    starts(false);
+    stream.ended = true;
+    if (!past.length) refuse(problems.map(({ text }) => text));
+  },
 };
 
 function open({ facts, blocks, run }) {

@@ -7,6 +7,7 @@ import random
 import numpy as np
 import pytest
 
+from laboratory import laboratory
 from laboratory_page import inside, moving, pixel, slide, type_at
 from ricochet import Simulation
 from ricochet.pages.worker import DISKS, setting_lines
@@ -440,3 +441,27 @@ def test_a_slider_without_a_value_says_which_variable_determines_it(opened):
     assert opened.run(notes)[1] == "at once"
     opened.run("set('contact.restitution', '0.8')")
     assert opened.run("return numberOf('contact.wall_restitution')") == 0.95
+
+
+def test_an_input_with_mistakes_shows_them_in_the_place_of_its_film(browser, program, tmp_path):
+    (tmp_path / "own.nml").write_text("&species masss = 1 count = 9 /\n&box uper = 2, 2 /\n")
+    with laboratory(program, tmp_path, tmp_path / "own.nml") as (_, address):
+        browser.open(f"{address}#input=own")
+        browser.until("return document.querySelector('#status.problem')")
+        film = "filmOf(current()).document"
+        shown = browser.run(f"return {film}.getElementById('starting').innerText").splitlines()
+        assert [line.partition(";")[0] for line in shown] == [
+            "own.nml:1: species.masss: unknown variable",
+            "own.nml:1: species.radius: is missing",
+            "own.nml:2: box.uper: unknown variable",
+        ]
+        seen = "return getComputedStyle({}).visibility"
+        assert browser.run(seen.format(f"{film}.getElementById('starting')")) == "visible"
+        assert "no sliders" in browser.run("return $('sliders').innerText")
+        (tmp_path / "own.nml").write_text("&species radius = 0.01 count = 9 speed = 1 /\n")
+        browser.click("run")
+        moving(browser)
+        assert browser.run(seen.format(f"{film}.getElementById('starting')")) == "hidden"
+        assert browser.run(seen.format(f"{film}.getElementById('stage')")) == "visible"
+        assert browser.complaints() == []
+        browser.open("about:blank")

@@ -108,7 +108,7 @@ class Session:
             if other.n_disks > DISKS:
                 raise ProgramError(f"the laboratory allows {DISKS} disks", 2)
         except (ProgramError, ValueError) as problem:
-            refuse(problem)
+            refuse(problem, name=f"{request['input']}.nml")
             return
         if self.simulation:
             self.simulation.close()
@@ -452,19 +452,23 @@ def setting_lines(settings: dict[str, str]) -> list[str]:
     return lines
 
 
-def problems(reason: Exception) -> list[dict]:
-    """Return the error messages of the program, each with the variable that caused it."""
+def problems(reason: Exception, name: str = "input") -> list[dict]:
+    """Return the error messages of the program, each with the setting that caused it.
+
+    A message about a setting is shown beside its field, and therefore omits its name. All other
+    messages begin with the `name` of the input file and the line.
+    """
     found = []
     for line in str(reason).splitlines():
         place = line.removeprefix("--set ").partition("=")[0] if line.startswith("--set ") else ""
-        text = re.sub(r"^(--set .*|\w+:\d+): \w+\.\w+: ", "", line)
-        found.append({"place": place, "text": text})
+        text = re.sub(r"^--set .*: \w+\.\w+: ", "", line)
+        found.append({"place": place, "text": re.sub(r"^input(?=:)", name, text)})
     return found
 
 
-def refuse(reason: Exception, change: bool = False) -> None:
+def refuse(reason: Exception, change: bool = False, name: str = "input") -> None:
     """Tell the page why a request was refused."""
-    send_json({"is": "problems", "change": change, "problems": problems(reason)})
+    send_json({"is": "problems", "change": change, "problems": problems(reason, name)})
 
 
 def send(kind: bytes, body: bytes) -> None:
