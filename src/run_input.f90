@@ -2,21 +2,22 @@
 !> (`&change`). Each change, scheduled or made in a simulation in memory, replaces some values in a
 !> copy of the given groups. The copy is converted to settings like the groups of an input file.
 module run_input
-  use box_state, only: bounds, box_state_t
+  use box_state, only: box_state_t
   use changes, only: missing_data
   use errors, only: error_t
   use input_fit, only: check_fit, complete_settings
-  use input_groups, only: group_t, range_of, same_value, same_values
+  use input_groups, only: group_t, range_of, same_values
   use input_problems, only: problem_list_t
   use input_settings, only: check_interval, resolve_settings
+  use input_surfaces, only: put_positions
   use input_text, only: read_text
   use kinds, only: int64, real64
   use namelist_input, only: override_groups, read_groups
-  use partners, only: n_sides, side_name
-  use settings, only: run_input_t
+  use partners, only: n_sides
+  use settings, only: run_input_t, settings_t
   use simulation_state, only: change_t
   use system, only: print_text
-  use texts, only: digits, letters, lower_case, place_of, shown, text_t, written
+  use texts, only: digits, letters, lower_case, shown, text_t, written
   use variable_help, only: groups_text, input_of
   use variables, only: change_of, in_motion, row_of, table, words_of
   implicit none
@@ -58,24 +59,26 @@ contains
     call read_groups(text, overrides, input%given_groups, problems, complete)
     if (present(printed)) call print_text(groups_text(input%given_groups), error)
     if (allocated(error)) return
-    call resolve_input(input, complete, problems, .false., stepped)
+    call resolve_input(input, complete, problems, stepped)
     if (problems%count == 0) call plan_changes(input, problems, stepped)
     call problems%report(path, error, overrides)
   end subroutine input_from_text
 
-  !> Converts the groups of an input to settings.
-  subroutine resolve_input(input, complete, problems, running, stepped)
+  !> Converts the groups of an input to settings. With `box` and `t`, the input changes a running
+  !> simulation.
+  subroutine resolve_input(input, complete, problems, stepped, box, t)
     type(run_input_t), intent(inout) :: input
     logical, intent(inout) :: complete      !! .false. if part of the text could not be read
     type(problem_list_t), intent(inout) :: problems                 !! further problems are added to the list
-    logical, intent(in) :: running                                  !! see `check_fit`
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
+    type(box_state_t), intent(in), optional :: box                  !! see `take_wall_laws`
+    real(real64), intent(in), optional :: t                         !! see `take_wall_laws`
 
     input%groups = input%given_groups
     if (.not. complete) return  ! variables in unreadable parts of the text are not missing
-    call resolve_settings(input%groups, input%settings, problems, stepped)
+    call resolve_settings(input%groups, input%settings, problems, stepped, box, t)
     call complete_settings(input%settings, input%groups, problems, complete)
-    if (complete) call check_fit(input%settings, input%groups, problems, running)
+    if (complete) call check_fit(input%settings, input%groups, problems, present(box))
   end subroutine resolve_input
 
   !> Determines the system after each change in the input, and reports impossible changes.
@@ -144,7 +147,6 @@ contains
     logical, intent(in), optional :: stepped                        !! see `resolve_settings`
     type(run_input_t) :: after
     type(problem_list_t) :: own
-    type(box_state_t) :: box
     character(len=:), allocatable :: problem
     integer :: k, line
 
@@ -159,8 +161,8 @@ contains
       if (fixed_variable(change%lines(k)%text) /= "") &
         call own%add(0, fixed_variable(change%lines(k)%text), "cannot change in a running simulation")
     end do
-    box = foreseen_box(before)
-    if (own%count == 0) call changed_input(before, change%lines, box, change%time, after, own, stepped)
+    if (own%count == 0) &
+      call changed_input(before, change%lines, foreseen_box(before), change%time, after, own, stepped)
     if (own%count == 0) then
       problem = missing_data(before%settings%system_t, after%settings%system_t)
       if (problem /= "") call own%add(0, "set", problem)
@@ -170,8 +172,6 @@ contains
     end do
     if (own%count > 0) return
     change%is_empty = changes_nothing(before, after, stepped)
-    call box%change(after%settings%box, change%time)
-    after%settings%box%side = box%side
     change%system = after%settings%system_t
     change%box = after%settings%box
     deallocate (change%box%obstacle)
@@ -207,9 +207,11 @@ contains
     after%given_groups = before%given_groups
     call override_groups(after%given_groups, lines, problems, complete)
     call drop_former_motion(before%given_groups, after%given_groups)
-    call keep_sides(before%given_groups, after%given_groups, box, t)
-    call resolve_input(after, complete, problems, .true., stepped)
-    if (problems%count == 0) call check_entries(after, box%epoch + t, problems)
+    call resolve_input(after, complete, problems, stepped, box, t)
+    if (problems%count > 0) return
+    call put_positions(after%given_groups, after%settings%box)
+    call put_positions(after%groups, after%settings%box)
+    call check_entries(after, box%epoch + t, problems)
   end subroutine changed_input
 
   !> Reports a source whose interval is too short, because its entries up to the time of a change
@@ -237,7 +239,6 @@ contains
     type(box_state_t), intent(in) :: box                            !! present box
     type(error_t), allocatable, intent(out) :: error
     type(run_input_t) :: before, after
-    type(box_state_t) :: foreseen
     type(problem_list_t) :: problems
     integer :: k
 
@@ -245,10 +246,7 @@ contains
     do k = 1, int(made)
       before = after
       associate (change => input%settings%schedule(k))
-        foreseen = foreseen_box(before)
-        call changed_input(before, change%lines, foreseen, change%time, after, problems, stepped=.true.)
-        call foreseen%change(after%settings%box, change%time)
-        after%settings%box%side = foreseen%side
+        call changed_input(before, change%lines, foreseen_box(before), change%time, after, problems, stepped=.true.)
       end associate
     end do
     call fold(after%given_groups)
@@ -268,7 +266,7 @@ contains
       logical :: left(size(groups))
       integer :: g, v
 
-      call move_sides(groups, box)
+      call put_positions(groups, box%box_t)
       v = row_of("change", "name")
       left = .true.
       do g = 1, size(groups)
@@ -279,38 +277,6 @@ contains
       groups = pack(groups, left)
     end subroutine fold
   end subroutine fold_changes
-
-  !> Sets the variable `position` of each side to its value in the box, which depends on the
-  !> simulation so far.
-  subroutine move_sides(groups, box)
-    type(group_t), intent(inout) :: groups(:)
-    type(box_state_t), intent(in) :: box
-    real(real64) :: offsets(n_sides)
-    integer :: g, side, axis
-
-    offsets = box%side%offset()
-    do g = 1, size(groups)
-      side = place_of(trim(groups(g)%instance), side_name)
-      if (groups(g)%name /= "side" .or. side == 0) cycle
-      if (.not. has_position(groups(g))) cycle
-      axis = (side + 1)/2
-      associate (position => groups(g)%values(row_of("side", "position")), offset => offsets(side))
-        position%given = abs(offset) > 0
-        call position%clear()
-        if (position%given) position%reals = [merge(box%lower(axis) + offset, box%upper(axis) - offset, modulo(side, 2) == 1)]
-      end associate
-    end do
-  end subroutine move_sides
-
-  !> True if the motion of a side has the variable `position`.
-  pure function has_position(side) result(yes)
-    type(group_t), intent(in) :: side
-    logical :: yes
-
-    associate (position => side%values(row_of("side", "position")))
-      yes = any(words_of(table(position%row)%goes_with) == side%text_of("motion"))
-    end associate
-  end function has_position
 
   !> Name of the variable of a change that must not change in a running simulation; empty if it may.
   !> Unknown variables are reported by `read_groups` instead.
@@ -331,7 +297,8 @@ contains
     type(run_input_t), intent(in) :: before, after
     logical, intent(in), optional :: stepped          !! see `resolve_settings`
     logical :: yes, complete
-    type(run_input_t) :: present_input
+    type(group_t), allocatable :: groups(:)           ! groups of the present input
+    type(settings_t) :: settings
     type(problem_list_t) :: problems
     type(text_t), allocatable :: sides(:)             ! overrides that create the missing groups of sides
     integer :: g
@@ -344,11 +311,12 @@ contains
         sides = [sides, text_t("side."//trim(group%instance)//".motion=")]
       end associate
     end do
-    present_input%given_groups = before%given_groups
-    call override_groups(present_input%given_groups, sides, problems, complete)
-    call resolve_input(present_input, complete, problems, .true., stepped)
+    groups = before%given_groups
+    call override_groups(groups, sides, problems, complete)
+    call resolve_settings(groups, settings, problems, stepped)
+    call complete_settings(settings, groups, problems, complete)
     yes = problems%count == 0
-    if (yes) yes = same_values(present_input%groups, after%groups)
+    if (yes) yes = same_values(groups, after%groups)
   end function changes_nothing
 
   !> Drops the variables of a side that have no effect with its new motion, such as the force on a
@@ -370,52 +338,5 @@ contains
       end do
     end do
   end subroutine drop_former_motion
-
-  !> Sets the position of each side with a new motion, so that the motion starts at the present
-  !> position of the side.
-  subroutine keep_sides(before, groups, box, t)
-    type(group_t), intent(in) :: before(:)            !! groups of the present input
-    type(group_t), intent(inout) :: groups(:)         !! groups of the changed input
-    type(box_state_t), intent(in) :: box              !! see `changed_input`
-    real(real64), intent(in) :: t                     !! see `changed_input`
-    character(len=10), parameter :: of_motion(4) = [character(len=10) :: "motion", "velocity", "start_time", "end_time"]
-    ! Positions of the sides (axis, lower or upper) and of one side [length]; time when a motion
-    ! starts, and its duration so far [time]
-    real(real64) :: at(2, 2), x, start, passed
-    integer :: g, k, old, side, inwards
-    logical :: same
-
-    call bounds(box, t, at(:, 1), at(:, 2))
-    do g = 1, size(groups)
-      side = place_of(trim(groups(g)%instance), side_name)
-      if (groups(g)%name /= "side" .or. side == 0) cycle
-      associate (group => groups(g), position => groups(g)%values(row_of("side", "position")))
-        old = findloc(before%name == "side" .and. before%instance == group%instance, .true., dim=1)
-        same = old > 0
-        do k = 1, size(of_motion)
-          if (.not. same) exit
-          associate (new => group%values(row_of("side", trim(of_motion(k)))), &
-            then => before(old)%values(row_of("side", trim(of_motion(k)))))
-            same = .not. (new%given .or. then%given) .or. same_value(new, then)
-          end associate
-        end do
-        if (same) cycle
-        inwards = 2*modulo(side, 2) - 1               ! sign of the inward normal along the axis
-        x = at((side + 1)/2, merge(1, 2, inwards > 0))
-        position%given = has_position(group)
-        call position%clear()
-        if (.not. position%given) cycle
-        if (group%text_of("motion") == "constant_velocity") then
-          start = group%real_of("start_time", 0.0_real64)
-          passed = min(max(box%epoch + t, start), group%real_of("end_time", start)) - start
-          x = x - inwards*group%real_of("velocity", 0.0_real64)*passed
-        end if
-        position%reals = [x]
-        if (inwards > 0) position%given = abs(x - box%lower((side + 1)/2)) > 0
-        if (inwards < 0) position%given = abs(x - box%upper((side + 1)/2)) > 0
-        if (.not. position%given) call position%clear()
-      end associate
-    end do
-  end subroutine keep_sides
 
 end module run_input

@@ -3,6 +3,7 @@
 module input_settings
   use kinds, only: int64, never, real64, unlimited
   use box_geometry, only: box_t
+  use box_state, only: box_state_t
   use contact_law, only: contact_law_t
   use restitution_law, only: chosen_restitution_law
   use tangential_law, only: tangential_law_t
@@ -29,12 +30,14 @@ contains
 
   !> Converts the groups to settings. Derived values are also stored in the groups, which then
   !> contain all values used in the run.
-  subroutine resolve_settings(groups, settings, problems, stepped)
+  subroutine resolve_settings(groups, settings, problems, stepped, running, t)
     type(group_t), intent(inout) :: groups(:)             !! groups of the same name are adjacent
     type(settings_t), intent(out) :: settings
     type(problem_list_t), intent(inout) :: problems
     !> .true. if the caller ends the run; `&stop` may then be empty.
     logical, intent(in), optional :: stepped
+    type(box_state_t), intent(in), optional :: running    !! see `take_wall_laws`
+    real(real64), intent(in), optional :: t               !! see `take_wall_laws`
     logical :: must_end
     type(wall_law_t) :: all_walls                       ! default contact law of walls, from `&contact`
     integer :: e(2), o(2), s(2), w(2), k
@@ -53,7 +56,7 @@ contains
     call take_obstacles(groups(o(1):o(2)), settings%box, problems)
     call take_species(groups(s(1):s(2)), settings%box, settings%run%seed, settings%species, problems)
     call take_contact(groups(place_of("contact", groups%name)), size(settings%species), settings%law, all_walls, problems)
-    call take_wall_laws(groups(w(1):w(2)), groups(o(1):o(2)), all_walls, settings%box, problems)
+    call take_wall_laws(groups(w(1):w(2)), groups(o(1):o(2)), all_walls, settings%box, problems, running, t)
     settings%has_lids = any([(groups(k)%given("open"), k=w(1), w(2))])
     call take_drive(groups(place_of("drive", groups%name)), names_of(settings%species), settings%drive, problems)
     call take_sources(groups(e(1):e(2)), names_of(settings%species), settings%box, settings%source, problems)

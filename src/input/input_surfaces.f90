@@ -2,6 +2,7 @@
 module input_surfaces
   use arcs, only: new_arc
   use box_geometry, only: box_t
+  use box_state, only: box_state_t
   use box_side, only: side_t
   use circles, only: new_circle
   use restitution_law, only: restitution_law_t
@@ -14,14 +15,14 @@ module input_surfaces
   use group_fields, only: group_fields_t
   use input_groups, only: group_t
   use motions, only: choose_motion
-  use variables, only: either, table, words_of
+  use variables, only: either, row_of, table, words_of
   use obstacle_file, only: read_obstacles
   use partners, only: n_sides, side_name
   use segments, only: new_segment
   use texts, only: counted, place_of, written
   implicit none
   private
-  public :: check_least, has_many, take_grip, take_obstacles, take_wall_laws
+  public :: check_least, has_many, put_positions, take_grip, take_obstacles, take_wall_laws
 
 contains
 
@@ -188,13 +189,17 @@ contains
   end subroutine check_angles
 
   !> Reads the contact laws of all sides and obstacles, and the motions of all sides. Values missing
-  !> in a group are taken from `&contact`.
-  subroutine take_wall_laws(sides, obstacles, otherwise, box, problems)
+  !> in a group are taken from `&contact`. With `running` and `t`, the input changes a running
+  !> simulation. A side with a new motion then starts it at its present position, and an unchanged
+  !> motion continues.
+  subroutine take_wall_laws(sides, obstacles, otherwise, box, problems, running, t)
     type(group_t), intent(inout) :: sides(:)
     type(group_t), intent(inout) :: obstacles(:)
     type(wall_law_t), intent(in) :: otherwise             !! default contact law
     type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
+    type(box_state_t), intent(in), optional :: running    !! box before the change
+    real(real64), intent(in), optional :: t               !! time relative to `running%epoch` [time]
     integer :: k, side, line_of(n_sides)
     integer :: axis
     real(real64) :: width                                 ! width of the box [length]
@@ -264,23 +269,60 @@ contains
       type(group_t), intent(in) :: group
       type(side_t), intent(out) :: place
       type(group_fields_t) :: fields
-      real(real64) :: offset      ! displacement inwards when the motion starts [length]
 
       if (group%faulty("motion")) return
       call choose_motion(group%text_of("motion"), place%motion)
       fields = group_fields_t(group, problems)
       if (allocated(place%motion)) call place%motion%read(fields, width)
-      offset = 0
-      if (group%given("position") .and. .not. group%faulty("position")) offset = merge( &
-        group%real_of("position", 0.0_real64) - box%lower(axis), box%upper(axis) - group%real_of("position", 0.0_real64), &
-        modulo(side, 2) == 1)
-      call place%place(offset)
+      if (present(running)) then
+        call place%follow(running%side(side), running%side_position(side, t), running%epoch + t)
+      else
+        call place%place(given_offset(group, box, side))
+      end if
       if (.not. allocated(place%motion)) return
       call place%motion%check(fields)
       problems = fields%problems
     end subroutine take_motion
 
   end subroutine take_wall_laws
+
+  !> Inward displacement of a side when its motion starts, according to the variable `position`.
+  pure function given_offset(group, box, side) result(x)
+    type(group_t), intent(in) :: group
+    type(box_t), intent(in) :: box
+    integer, intent(in) :: side
+    real(real64) :: x                                     !! [length]
+
+    x = 0
+    if (.not. group%given("position") .or. group%faulty("position")) return
+    associate (position => group%real_of("position", 0.0_real64), axis => (side + 1)/2)
+      x = merge(position - box%lower(axis), box%upper(axis) - position, modulo(side, 2) == 1)
+    end associate
+  end function given_offset
+
+  !> Sets the variable `position` of each side to the position at which its motion started in a
+  !> running simulation.
+  subroutine put_positions(groups, box)
+    type(group_t), intent(inout) :: groups(:)
+    type(box_t), intent(in) :: box                        !! box of the running simulation
+    real(real64) :: offset(n_sides)                       ! [length]
+    integer :: g, side, axis
+
+    offset = box%side%offset()
+    do g = 1, size(groups)
+      side = place_of(trim(groups(g)%instance), side_name)
+      if (groups(g)%name /= "side" .or. side == 0) cycle
+      associate (position => groups(g)%values(row_of("side", "position")))
+        if (.not. any(words_of(table(position%row)%goes_with) == groups(g)%text_of("motion"))) cycle
+        if (.not. abs(given_offset(groups(g), box, side) - offset(side)) > 0) cycle
+        axis = (side + 1)/2
+        position%given = abs(offset(side)) > 0
+        call position%clear()
+        if (position%given) position%reals = [merge(box%lower(axis) + offset(side), box%upper(axis) - offset(side), &
+          modulo(side, 2) == 1)]
+      end associate
+    end do
+  end subroutine put_positions
 
   !> Reports coefficients of restitution below the minimum of the viscoelastic law.
   subroutine check_least(group, name, by_speed, problems)
