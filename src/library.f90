@@ -89,7 +89,7 @@ contains
     end associate
     call start_threads(session%input%settings, warning)
     call choose_evolution(session%input%settings, session%evolution)
-    session%rule = stop_rule_t(session%input%settings%stop, session%sim)
+    session%rule = session%input%settings%stop%applied_to(session%sim)
     session%logged = session%input%settings%output%event_log
     call session%evolution%start(session%sim)
     handle = c_loc(session)
@@ -120,7 +120,7 @@ contains
     session => session_of(handle)
     rule = goal_of(session, time, collisions, events)
     call advance_to(session, rule, patience, code, error)
-    if (code == 0) call report_rest(session%sim, rule%limits, error)
+    if (code == 0) call report_rest(session%sim, rule%limits_t, error)
     if (allocated(error) .or. code /= going_on) code = answer(error, message, room)
   end function advance
 
@@ -134,8 +134,8 @@ contains
 
     rule = session%rule
     if (.not. (time < never .or. ieee_is_nan(time) .or. min(collisions, events) < huge(events))) return
-    rule%limits = limits_t(time=time, collisions=collisions, events=events, at_rest=rule%limits%at_rest)
-    if (time >= never) rule%limits%time = never
+    rule%limits_t = limits_t(time=time, collisions=collisions, events=events, at_rest=rule%at_rest)
+    if (time >= never) rule%time = never
   end function goal_of
 
   !> Advances a simulation until a stop rule is met, or until `patience` seconds have passed; `code`
@@ -150,7 +150,7 @@ contains
     real(real64) :: began, looked                     ! start of the call and of the present step [s]
 
     code = going_on
-    if (ieee_is_nan(rule%limits%time)) then
+    if (ieee_is_nan(rule%time)) then
       call fail(error, exit_usage, "time: NaN is not a time")
       return
     end if
@@ -159,7 +159,7 @@ contains
     do while (.not. rule%is_over(session%sim, session%evolution))
       looked = seconds()
       if (.not. looked - began <= patience) return
-      limits = rule%limits
+      limits = rule%limits_t
       limits%iterations = session%iterations
       if (session%logged) then
         call advance_once(session%evolution, session%sim, limits, error, session%log)
@@ -393,7 +393,7 @@ contains
     type(simulation_t), intent(in) :: sim
 
     session%sim = sim
-    session%rule = stop_rule_t(session%input%settings%stop, session%sim)
+    session%rule = session%input%settings%stop%applied_to(session%sim)
     call choose_evolution(session%input%settings, session%evolution)
     call session%evolution%start(session%sim)
   end subroutine renew

@@ -55,7 +55,7 @@ contains
 
     session => session_of(handle)
     rule = goal_of(session, time, collisions, events)
-    rule%limits%events = min(rule%limits%events, session%sim%tally%events + 1)
+    rule%events = min(rule%events, session%sim%tally%events + 1)
     if (.not. session%input%settings%output%event_log) session%log%n = 0
     session%logged = .true.
     call advance_to(session, rule, patience, code, error)

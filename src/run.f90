@@ -83,7 +83,7 @@ contains
       call run%output%release()
       return
     end if
-    run%stop_rule = stop_rule_t(run%input%settings%stop, run%sim)
+    run%stop_rule = run%input%settings%stop%applied_to(run%sim)
     call follow(run, error)
     if (.not. allocated(error)) call run%output%finish(run%sim, cost_of(run), note(run), error)
     if (allocated(error)) then
@@ -154,7 +154,7 @@ contains
       if (stop_requested() .and. .not. allocated(error)) &
         call fail(error, exit_stopped, "stopped before the run continued; nothing is lost: repeat the command")
       if (allocated(error)) return
-      rule = stop_rule_t(run%input%settings%stop, sim)
+      rule = run%input%settings%stop%applied_to(sim)
       if (finished .and. (rule%is_met(sim) .or. rule%rests(sim))) then
         call fail(error, exit_files, command%output//": is a finished run, of "//written(sim%time())//" time units and " &
           //written(sim%tally%collisions)//" collisions; to continue it, repeat the command with --resume and a later stop rule")
@@ -236,7 +236,7 @@ contains
     ! after this sample, the resumed run must call `advance_once` to detect its end.
     if (run%sim%events_done .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
     do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
-      limits = run%stop_rule%limits
+      limits = run%stop_rule%limits_t
       limits%iterations = iterations
       call run%output%tighten(limits)
       now = seconds()
@@ -264,7 +264,7 @@ contains
       end if
       call run%line%report(run%sim, run%stop_rule)
     end do
-    call report_rest(run%sim, run%stop_rule%limits, error)
+    call report_rest(run%sim, run%stop_rule%limits_t, error)
     call run%line%clear()
   end subroutine main_loop
 

@@ -7,7 +7,7 @@
 !> the time when the velocities were last set. The latter energy determines the magnitude of the
 !> rounding errors.
 module stop_rules
-  use kinds, only: int32, int64, never, real64, unlimited
+  use kinds, only: int32, int64, never, real64
   use entries, only: awaits_entry
   use evolution, only: evolution_t, limits_t
   use rest, only: has_come_to_rest, is_at_rest, stands_still
@@ -16,29 +16,19 @@ module stop_rules
   use timeline, only: next_action
   implicit none
   private
-  public :: coldness, stop_rule_t, stop_settings_t, whole_collisions
+  public :: coldness, stop_rule_t, whole_collisions
 
   !> Temperature at which a run ends, relative to the initial temperature.
   real(real64), parameter :: coldest = 1.0e-25_real64
   character(len=*), parameter :: coldness = "cooled to 1e-25 of the initial temperature"
 
-  !> The values of the stop rules in the input. The default values are never reached.
-  type :: stop_settings_t
-    real(real64) :: time = never
-    integer(int64) :: collisions = unlimited
+  !> The stop rules of the input. The default values are never reached.
+  type, extends(limits_t) :: stop_rule_t
     real(real64) :: collisions_per_disk = never
-    integer(int64) :: events = unlimited
-    real(real64) :: energy_fraction = 0.0_real64
-    logical :: at_rest = .false.                      !! whether the run ends when all disks are at rest
-    !> Number of disks in the box at which a departure ends the run; -1: no limit.
-    integer(int64) :: disks_inside = -1
+    real(real64) :: energy_fraction = 0.0_real64      !! remaining fraction of the initial energy
     real(real64) :: wall_clock = never                !! [s]
-  end type stop_settings_t
-
-  type :: stop_rule_t
-    type(limits_t) :: limits
-    real(real64) :: wall_clock = never       !! [s]
   contains
+    procedure :: applied_to
     procedure :: is_met
     procedure :: rests
     procedure :: too_cold
@@ -46,27 +36,19 @@ module stop_rules
     procedure :: share
   end type stop_rule_t
 
-  interface stop_rule_t
-    module procedure new_stop_rule
-  end interface stop_rule_t
-
 contains
 
-  !> The stop rules of the input as limits on quantities of the simulation.
-  pure function new_stop_rule(settings, sim) result(rule)
-    type(stop_settings_t), intent(in) :: settings
+  !> The stop rules for a simulation, whose number of disks and initial energy determine the limits
+  !> on collisions and on the dissipated energy.
+  pure function applied_to(self, sim) result(rule)
+    class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t) :: rule
 
-    rule%limits%time = settings%time
-    rule%limits%collisions = min(settings%collisions, &
-      whole_collisions(0.5_real64*settings%collisions_per_disk*sim%n_disks()))
-    rule%limits%events = settings%events
-    rule%limits%at_rest = settings%at_rest
-    rule%limits%disks_inside = settings%disks_inside
-    rule%wall_clock = settings%wall_clock
-    if (settings%energy_fraction > 0) rule%limits%dissipated = (1 - settings%energy_fraction)*sim%start_energy
-  end function new_stop_rule
+    rule = self
+    rule%collisions = min(rule%collisions, whole_collisions(0.5_real64*rule%collisions_per_disk*sim%n_disks()))
+    if (rule%energy_fraction > 0) rule%dissipated = (1 - rule%energy_fraction)*sim%start_energy
+  end function applied_to
 
   !> A real number of collisions, rounded up to an integer. If the number exceeds an integer only by
   !> rounding errors, it is rounded down. The result is huge(n) if the number exceeds the range of
@@ -85,8 +67,8 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = sim%has_reached(self%limits%time) .or. self%limits%reached(sim%tally)
-    if (yes .or. .not. self%limits%at_rest .or. awaits_entry(sim)) return
+    yes = sim%has_reached(self%time) .or. self%reached(sim%tally)
+    if (yes .or. .not. self%at_rest .or. awaits_entry(sim)) return
     yes = has_come_to_rest(sim)
     if (.not. yes) yes = stands_still(sim) .and. is_at_rest(sim)
   end function is_met
@@ -99,7 +81,7 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = self%limits%at_rest .and. .not. awaits_entry(sim)
+    yes = self%at_rest .and. .not. awaits_entry(sim)
     if (yes) yes = is_at_rest(sim)
   end function rests
 
@@ -128,7 +110,7 @@ contains
 
     yes = self%is_met(sim) .or. self%too_cold(sim)
     if (.not. yes .and. evolution%idle) &
-      yes = self%rests(sim) .or. .not. min(self%limits%time, next_action(evolution, sim)) < never
+      yes = self%rests(sim) .or. .not. min(self%time, next_action(evolution, sim)) < never
   end function is_over
 
   !> Kinetic energy relative to the mean velocity. The mean velocity is computed in a separate pass
@@ -160,10 +142,10 @@ contains
     real(real64) :: done
     real(real64), parameter :: least = 1/never     ! avoids a division by 0
 
-    done = max(sim%time()/max(self%limits%time, least), &
-      real(sim%tally%collisions, real64)/max(self%limits%collisions, 1_int64), &
-      real(sim%tally%events, real64)/max(self%limits%events, 1_int64), &
-      sim%tally%total(dissipated)/max(self%limits%dissipated, least), elapsed/max(self%wall_clock, least))
+    done = max(sim%time()/max(self%time, least), &
+      real(sim%tally%collisions, real64)/max(self%collisions, 1_int64), &
+      real(sim%tally%events, real64)/max(self%events, 1_int64), &
+      sim%tally%total(dissipated)/max(self%dissipated, least), elapsed/max(self%wall_clock, least))
     done = min(max(done, 0.0_real64), 1.0_real64)
   end function share
 

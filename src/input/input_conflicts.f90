@@ -7,7 +7,7 @@ module input_conflicts
   use motions, only: pistons
   use settings, only: settings_t
   use simulation_state, only: drive_t
-  use stop_rules, only: stop_settings_t
+  use stop_rules, only: stop_rule_t
   use texts, only: place_of, text_t
   implicit none
   private
@@ -205,7 +205,7 @@ contains
 
   !> True if the run ends at a given time.
   pure function has_time_limit(rule, must_end) result(yes)
-    type(stop_settings_t), intent(in) :: rule
+    type(stop_rule_t), intent(in) :: rule
     logical, intent(in) :: must_end
     logical :: yes
 
@@ -214,7 +214,7 @@ contains
 
   !> True if the run ends at a number of collisions.
   pure function has_collision_limit(rule) result(yes)
-    type(stop_settings_t), intent(in) :: rule
+    type(stop_rule_t), intent(in) :: rule
     logical :: yes
 
     yes = rule%collisions < unlimited .or. rule%collisions_per_disk < never

@@ -19,7 +19,7 @@ module input_settings
   use placement, only: placement_t
   use settings, only: output_settings_t, run_settings_t, sampled, sampled_by, sampling_t, settings_t
   use simulation_state, only: drive_t
-  use stop_rules, only: stop_settings_t
+  use stop_rules, only: stop_rule_t
   use texts, only: counted, joined, place_of, shown, suggestion, written
   use variables, only: is_repeated, obstacle_groups, row_of, variables_of, words_of
   implicit none
@@ -213,7 +213,7 @@ contains
   subroutine take_stop(group, must_end, rule, problems)
     type(group_t), intent(in) :: group
     logical, intent(in) :: must_end                     !! .true. if the input must contain a stop rule
-    type(stop_settings_t), intent(inout) :: rule
+    type(stop_rule_t), intent(inout) :: rule
     type(problem_list_t), intent(inout) :: problems
 
     rule%time = group%real_of("time", never)
@@ -383,7 +383,7 @@ contains
   subroutine check_number(group, name, of_what, most, rule, groups, problems)
     character(len=*), intent(in) :: group, name, of_what
     real(real64), intent(in) :: most
-    type(stop_settings_t), intent(in) :: rule
+    type(stop_rule_t), intent(in) :: rule
     type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
     real(real64) :: number

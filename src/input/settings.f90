@@ -8,7 +8,7 @@ module settings
   use input_groups, only: group_t, text_length
   use placement, only: placement_t
   use simulation_state, only: change_t, system_t
-  use stop_rules, only: stop_settings_t
+  use stop_rules, only: stop_rule_t
   use texts, only: text_t, written
   implicit none
   private
@@ -118,7 +118,7 @@ module settings
     type(box_t) :: box
     type(run_settings_t) :: run
     type(species_settings_t), allocatable :: species(:)
-    type(stop_settings_t) :: stop
+    type(stop_rule_t) :: stop
     type(output_settings_t) :: output
     !> Whether the variable `open` of any side is set, so that this side can be opened or closed.
     logical :: has_lids = .false.

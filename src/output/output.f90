@@ -241,7 +241,7 @@ contains
     type(stop_rule_t) :: rule
 
     self%input = input
-    rule = stop_rule_t(input%settings%stop, sim)
+    rule = input%settings%stop%applied_to(sim)
     associate (settings => input%settings%output)
       allocate (self%track(merge(events, values, settings%event_log)))
       self%track(frames)%counter = frame_counter
@@ -249,15 +249,15 @@ contains
       self%track(frames)%series = frame_series(self%columns, sim%n_disks(), settings%single_precision)
       self%track(values)%counter = sample_counter
       self%track(values)%series = observable_series(observed(sim))
-      self%track(:values)%planned = self%progress%schedule%planned(rule%limits)
+      self%track(:values)%planned = self%progress%schedule%planned(rule%limits_t)
       if (settings%event_log) then
         self%track(events)%counter = event_counter
         self%track(events)%series = event_series()
-        self%track(events)%planned = planned_events(rule%limits)
+        self%track(events)%planned = planned_events(rule%limits_t)
       end if
       self%is_copied = any(self%track%planned == 0)
       ! Collisions with boundaries are also logged, but do not count as disk–disk collisions.
-      if (settings%event_log) self%is_copied = self%is_copied .or. (rule%limits%collisions < unlimited &
+      if (settings%event_log) self%is_copied = self%is_copied .or. (rule%collisions < unlimited &
         .and. (sim%box%has_obstacles() .or. .not. all(sim%box%periodic)))
     end associate
   end subroutine plan
