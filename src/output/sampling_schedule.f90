@@ -11,16 +11,15 @@ module sampling_schedule
   private
   public :: schedule_t, by_time, by_collisions, by_events, progress_t, frames, values
 
-  !> Quantities in which sampling intervals are measured.
-  integer, parameter :: by_time = 1, by_collisions = 2, by_events = 3
+  !> Quantities in which sampling intervals are measured, see `settings: sampled_by`.
+  integer, parameter :: by_time = 1, by_collisions = 2, by_events = 3, by_collisions_per_disk = 4
 
   !> Times that differ by at most this number of units in the last place are treated as equal.
   integer, parameter :: units_lost = 4
 
-  type :: schedule_t
-    !> Sampling intervals in time, in collisions and in events; not necessarily integers.
-    real(real64) :: every(3) = never
-    type(sampling_t) :: chosen      !! sampling schedule in the input, including its list of times
+  !> A sampling schedule during a run. Its interval in collisions, not necessarily an integer, also
+  !> represents the interval in collisions per disk.
+  type, extends(sampling_t) :: schedule_t
     integer(int64) :: count = 0                   !! number of samples taken; the first is due at the start
     !> Time, number of collisions and number of events at which the next samples are due.
     real(real64) :: next(3) = never
@@ -57,19 +56,12 @@ contains
     integer :: k
 
     do k = frames, values
-      progress%schedule(k)%every = intervals(settings%output%sampling(k)%every)
-      progress%schedule(k)%chosen = settings%output%sampling(k)
+      associate (schedule => progress%schedule(k))
+        schedule%sampling_t = settings%output%sampling(k)
+        schedule%every(by_collisions) = min(schedule%every(by_collisions), &
+          0.5_real64*settings%n_disks()*schedule%every(by_collisions_per_disk))
+      end associate
     end do
-  contains
-
-    !> Converts the sampling intervals of the input to intervals in time, in collisions and in
-    !> events. An interval in collisions per disk becomes an interval in collisions.
-    pure function intervals(every)
-      real(real64), intent(in) :: every(:)        !! see `settings: sampled_by`
-      real(real64) :: intervals(3)
-
-      intervals = [every(1), min(every(2), 0.5_real64*settings%n_disks()*every(4)), every(3)]
-    end function intervals
   end function new_progress
 
   !> True if a sample is due at the present time.
@@ -112,7 +104,7 @@ contains
 
     over = sim%events_done .or. self%last_time >= sim%time()
     self%next(by_time) = self%next_time(sim%time(), merge(sim%time(), self%last_time, over))
-    self%next(by_collisions:) = next_number([sim%tally%collisions, sim%tally%events], self%every(by_collisions:))
+    self%next(by_collisions:) = next_number([sim%tally%collisions, sim%tally%events], self%every(by_collisions:by_events))
   end subroutine look_ahead
 
   !> Lowers the limits, so that the simulation pauses at the next sample.
@@ -145,8 +137,8 @@ contains
       end do
       due(1) = n*self%every(by_time)
     end if
-    if (self%chosen%per_decade > 0) then
-      associate (from => self%chosen%from, steps => real(self%chosen%per_decade, real64))
+    if (self%per_decade > 0) then
+      associate (from => self%from, steps => real(self%per_decade, real64))
         n = max(0_int64, int(steps*log10(max(time, from)/from), int64) - 1)
         do while (.not. is_ahead(from*10**(n/steps)))
           n = n + 1
@@ -154,7 +146,7 @@ contains
         due(2) = from*10**(n/steps)
       end associate
     end if
-    if (allocated(self%chosen%at)) due(3) = first_ahead(self%chosen%at)
+    if (allocated(self%at)) due(3) = first_ahead(self%at)
     next = minval(due)
     do k = 2, 3
       if (due(k) <= next + units_lost*spacing(next)) next = due(k)
@@ -215,8 +207,8 @@ contains
     integer(int64) :: n
     logical :: given(3), limited(3), chooses
 
-    chooses = self%chosen%per_decade > 0 .or. allocated(self%chosen%at)
-    given = self%every < never
+    chooses = self%per_decade > 0 .or. allocated(self%at)
+    given = self%every(by_time:by_events) < never
     given(by_time) = given(by_time) .or. chooses
     limited = [limits%time < never, limits%collisions < huge(n), limits%events < huge(n)]
     n = 0
