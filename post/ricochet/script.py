@@ -53,7 +53,7 @@ class HelpFormatter(argparse.RawDescriptionHelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """Command-line parser that suggests a similar option for an unknown one."""
+    """Command-line parser that explains unknown arguments."""
 
     def parse_args(self, args: Sequence[str] | None = None, namespace=None) -> argparse.Namespace:
         words = joined(sys.argv[1:] if args is None else args)
@@ -62,6 +62,8 @@ class Parser(argparse.ArgumentParser):
             word = unknown[0].split("=")[0]
             if RENAMED.get(word) in self._option_string_actions:
                 self.error(f"{word} is called {RENAMED[word]} now")
+            if hasattr(known, "runs") and not word.startswith("-"):
+                self.error(f"takes one run, but {word} is a second one")
             self.error(f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}")
         if hasattr(known, "runs"):
             paths = known.runs if known.paired else finished(known.runs)

@@ -224,7 +224,10 @@ def test_wrong_words_are_refused_in_one_line(address, program, monkeypatch, caps
         (["--port", "99999"], "is not a port"),
         (["inpt/gas.nml"], "inpt/gas.nml: no such file; did you mean input/gas.nml?"),
         ([ROOT / "README.md"], "is not an input file"),
-        (["--port", port], f"lab.py: port {port}: Address already in use\n"),
+        (
+            ["--port", port],
+            f"lab.py: port {port}: Address already in use; choose another with --port, or 0 for",
+        ),
     ):
         assert run_script("lab", *words) == 2
         assert reason in capsys.readouterr().err

@@ -484,6 +484,7 @@ def test_results_are_written_into_files_of_ones_own(
         ("snapshot run.h5 --skip 5", "unknown argument --skip"),
         ("haff run.h5 --out a.png", "unknown argument --out; did you mean --output?"),
         ("haff run.h5 -o a.png --csv ./a.png", "a.png is the name of the figure, too"),
+        ("snapshot run.h5 runs/old.h5", "takes one run, but runs/old.h5 is a second one"),
         ("snapshot rum.h5", "no such file; did you mean run.h5?"),
         ("snapshot runs/odl.h5", "no such file; did you mean runs/old.h5?"),
         ("snapshot odl", "no such file; did you mean runs/old.h5?"),

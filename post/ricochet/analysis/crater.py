@@ -117,7 +117,8 @@ def projectile(run: Run) -> int:
         return int(np.flatnonzero(run.of_species("projectile"))[0])
     moving = np.flatnonzero(run.speed(0) > 0)
     if len(moving) != 1:
-        raise Refused(f"{run.path}: no species 'projectile' and {len(moving)} disks that move")
+        needed = "a crater requires a species 'projectile', or one moving disk among disks at rest"
+        raise Refused(f"{run.path}: {needed}; here {len(moving)} disks move")
     return int(moving[0])
 
 

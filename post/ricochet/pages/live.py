@@ -95,7 +95,7 @@ async def listen(runner: web.AppRunner, ports: Sequence[int]) -> None:
             return
         except OSError as problem:
             reason = os.strerror(problem.errno)
-    raise RunError(f"port {port}: {reason}")
+    raise RunError(f"port {port}: {reason}; choose another with --port, or 0 for any free port")
 
 
 @asynccontextmanager

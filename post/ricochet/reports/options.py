@@ -193,8 +193,8 @@ def late_frames(run: Run, options: SimpleNamespace, warnings: list[str]) -> list
         warnings.append(f"{says}{some}{options.min_separation:g} collisions per disk apart")
     tau = run.collisions_per_disk_at(run.time)[used[0]]
     if options.equilibration is None and tau < SPEEDS_FORGET * (1 - 1e-9):
-        early = f"begins {tau:.3g} collisions per disk after the start, which speeds remember for "
-        warnings.append(f"{says}{early}{SPEEDS_FORGET:g}; run longer")
+        early = f"its frames begin at {tau:.3g} collisions per disk, but the initial speeds may "
+        warnings.append(f"{says}{early}have an effect up to {SPEEDS_FORGET:g}; run longer")
     return used
 
 

@@ -119,7 +119,8 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     """Return the Lyapunov exponent from pairs of successive runs."""
     runs = groups[0].runs
     if len(runs) % 2:
-        raise RunError(f"{counted(len(runs), 'run')}: an even number is required")
+        given = counted(len(runs), "run")
+        raise RunError(f"{given}: an even number is required, to compare two at a time")
     apart = [distance(*pair) for pair in zip(runs[::2], runs[1::2], strict=True)]
     frames = min(map(len, apart))
     apart = np.array([track[:frames] for track in apart])
