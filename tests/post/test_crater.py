@@ -16,7 +16,7 @@ from ricochet.reports.registry import distinct
 from ricochet.reports.result import Result
 from sampling import held_as_often_as_stated, samples
 from synthetic_gases import TWO, gas
-from synthetic_run import drawn, run_script, write_run
+from synthetic_run import drawn, write_run
 
 
 def collision(path, b, ratio=1e6):
@@ -216,7 +216,7 @@ def test_exponents_hold_the_true_one_whether_points_share_beds(rng, shared, runs
         assert np.mean(held) == pytest.approx(0.6827, abs=0.075)
 
 
-def test_a_gas_without_projectile_is_told_what_a_crater_requires(tmp_path, rng, capsys):
-    assert run_script("crater", gas(tmp_path / "a.h5", rng, count=2)) == 1
-    said = capsys.readouterr().err
-    assert "requires a species 'projectile', or one moving disk" in said and said.count("\n") == 1
+def test_a_gas_without_projectile_is_told_what_a_crater_requires(tmp_path, rng):
+    said = "requires a species 'projectile', or one moving disk among disks at rest; here 2 disks"
+    with pytest.raises(ricochet.RunError, match=said):
+        crater.projectile(read_run(gas(tmp_path / "a.h5", rng, count=2)))
