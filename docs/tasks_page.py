@@ -77,8 +77,8 @@ used 32 pairs of runs of 520 s.
 | 0.004 | {missed_0.004} | {expected_0.004} |
 """,
     "equipartition": """\
-After a time T the mean energies of the two species agree within 10 %. The time T hardly depends on
-v₀. Among the four values of v₀, the shortest T is ({T_first}) s, and the longest T is ({T_last}) s.
+The mean energies of the two species agree within 10 % after the time T_therm. It hardly depends on
+v₀: among the four values of v₀, the shortest time is ({T_first}) s, and the longest ({T_last}) s.
 """,
     "laws": """\
 The table lists the slopes measured with seed 1, divided by the slopes of the exponential laws. The

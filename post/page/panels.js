@@ -387,6 +387,7 @@ function layTableOut() {
 }
 
 function tellEnergies() {
+  $('whose').textContent = state.total ? 'species' : 'disk';
   $('laboratory').hidden = !isCentred();  // momenta and velocities above are relative to the centre of mass
   kinds.forEach((_, s) => there().forEach((name, k) => {
     const now = name === 'rotational' ? lastOf(name, s) : moment[name][s];
@@ -441,10 +442,12 @@ function numbersNow() {
   return means.map((one, k) => ({ ...one, now: now[k] ?? null }));
 }
 
-// Explains the theoretical temperature, which is smaller than the kT in the pressure of an ideal gas, N kT per area.
+// Explains the theoretical temperature, which is smaller than the kT in the pressure of an ideal gas, N kT per area, or why it is
+// missing.
 function temperatureInWords(rows) {
   const theory = rows.find(({ name }) => name === 'temperature')?.theory;
-  return theory ? `The temperature excludes the mean motion: in theory it is kT (1 − 1/N), with N = ${disks} and kT = ${short(theory / (1 - 1 / disks))}.` : '';
+  if (!theory) return `The temperature is not predicted: the mean speeds in theory follow from the measured one.${film.gravity.some(Boolean) ? ' Under gravity the pressure depends on the height.' : ''}`;
+  return `The temperature excludes the mean motion: in theory it is kT (1 − 1/N), with N = ${disks} and kT = ${short(theory / (1 - 1 / disks))}.`;
 }
 
 // For a single run, the table lists the present, mean and theoretical value of each quantity. For several runs, it lists the

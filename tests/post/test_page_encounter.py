@@ -343,11 +343,11 @@ def test_the_next_event_is_labelled_and_can_be_hidden(two):
 def test_the_energies_of_both_tables_name_their_frame_of_reference(two):
     text = "return filmOf(current()).document.querySelector(arguments[0]).innerText"
     plain = [two.run(text, f"section:has(#{name}) h2") for name in ("bodies", "energies")]
-    assert plain == ["Momentum and energy", "Energy"]
+    assert plain == ["Momentum and energy", "Energy per disk"]
     two.run(CLICK, "centred")
     wait_for(lambda: inside(two, "state.centred"))
     found = [two.run(text, f"section:has(#{name}) h2") for name in ("bodies", "energies")]
-    assert found == ["Momentum and energy, centre-of-mass frame", "Energy, frame of the box"]
+    assert found == ["Momentum and energy, centre-of-mass frame", "Energy per disk, frame of the box"]
 
 
 def test_momenta_have_the_colours_of_their_disks_and_a_scale(two):
