@@ -33,7 +33,7 @@ SHOWN = {
     "gravity_missed": "tutorials",
 }
 #: Fraction of a figure, from its top, that the page shows [all].
-UPPER_PART = {"crater": 0.515}
+UPPER_PART = {"crater": 0.475}
 WIDTH, COLOURS = 1100, 128
 
 

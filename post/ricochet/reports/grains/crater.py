@@ -52,7 +52,7 @@ def draw_displacements(axes: plt.Axes, run: Run, frame: int) -> None:
     if frame == 0:
         draw_outline(axes, hull(run), COLOURS[1], "hull of the displaced disks")
     else:
-        draw_outline(axes, crater.hole(run), COLOURS[3], "hole: below half of the bed's packing")
+        draw_outline(axes, crater.hole(run), COLOURS[3], "hole: below half the packing")
     scale = plt.cm.ScalarMappable(plt.Normalize(*limits), "viridis")
     label = f"{drawing.label_of(run, 'displacement')} at the end"
     axes.figure.colorbar(scale, ax=axes, extend="max", label=label, **BELOW)
