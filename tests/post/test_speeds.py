@@ -1,8 +1,11 @@
 """Speeds of disks in equilibrium and in steady states: the scripts speeds and mixture."""
 
+from types import SimpleNamespace
+
 import h5py
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection
 
 from ricochet.reports.equilibrium import mixture
 from ricochet import RunError, read_run, script, speed_laws, speeds, thermodynamics
@@ -218,3 +221,18 @@ def test_a_temperature_that_varies_in_space_is_said(tmp_path, rng, capsys, hot):
     drawn(tmp_path, "speeds", path, "--equilibration", 20)
     said = capsys.readouterr().err
     assert ("kT varies in space by a factor of" in said) == (hot > 1), said
+
+
+def test_error_bars_of_a_mixture_are_those_of_its_independent_speeds(tmp_path, rng):
+    run = read_run(gas(tmp_path / "a.h5", rng, frames=3))
+    (kind,), heights = run.by_species, {}
+    for independent in (600, 150):
+        axes, result = plt.figure().add_subplot(), SimpleNamespace(runs=[run])
+        histogram = run.speed([0, 1, 2]).ravel(), np.linspace(0, 4, 20)
+        mixture.draw_speeds(axes, result, kind, *histogram, independent)
+        (bars,) = (one for one in axes.collections if isinstance(one, LineCollection))
+        heights[independent] = [np.ptp(line[:, 1]) for line in bars.get_segments()]
+        (label,) = axes.get_legend_handles_labels()[1]
+        assert label.endswith("600 speeds" + ", 150 independent" * (independent == 150))
+        plt.close("all")
+    assert heights[150] == pytest.approx(2 * np.array(heights[600]))

@@ -73,7 +73,7 @@ def draw_start(axes: plt.Axes, result: Result, kind: Species, bins: np.ndarray) 
     """Plot the initial speeds of a species."""
     row = row_of(result, kind)
     speeds = pooled(result.runs, [[0]] * len(result.runs), kind.name)
-    draw_speeds(axes, result, kind, speeds, bins)
+    draw_speeds(axes, result, kind, speeds, bins, len(speeds))
     axes.plot([], [], ls="", label="⟨v⟩ = {v_start:.4g},  ⟨K⟩ = {K_start:.4g}".format(**row))
     axes.set_title(f"{kind.name}, start")
     legend_above(axes)
@@ -82,7 +82,8 @@ def draw_start(axes: plt.Axes, result: Result, kind: Species, bins: np.ndarray) 
 def draw_late(axes: plt.Axes, result: Result, kind: Species, bins: np.ndarray) -> None:
     """Plot the speeds of a species in equilibrium with the Maxwell distribution."""
     row = row_of(result, kind)
-    draw_speeds(axes, result, kind, pooled(result.runs, result.values, kind.name), bins)
+    speeds = pooled(result.runs, result.values, kind.name)
+    draw_speeds(axes, result, kind, speeds, bins, row["speeds"])
     thermal = np.sqrt(2 * row["K_theory"] / kind.mass)
     v = np.linspace(0, bins[-1], 301)
     label = f"Maxwell: KS D = {row['KS_D']:.4f}, p = {row['KS_p']:.2g}"
@@ -95,13 +96,19 @@ def draw_late(axes: plt.Axes, result: Result, kind: Species, bins: np.ndarray) -
 
 
 def draw_speeds(
-    axes: plt.Axes, result: Result, kind: Species, speeds: np.ndarray, bins: np.ndarray
+    axes: plt.Axes,
+    result: Result,
+    kind: Species,
+    speeds: np.ndarray,
+    bins: np.ndarray,
+    independent: int,
 ) -> None:
-    """Plot a histogram of speeds with its error bars."""
+    """Plot a histogram of speeds, with error bars for the number of independent speeds."""
     run = result.runs[0]
     colour = COLOURS[run.names.index(kind.name) % len(COLOURS)]
-    style = {"color": colour, "label": f"{kind.label}: {len(speeds)} speeds"}
-    bars(axes, binned(speeds, bins), bins, fill=True, alpha=0.45, **style)
+    counted = f"{len(speeds)} speeds" + f", {independent} independent" * (independent < len(speeds))
+    style = {"color": colour, "label": f"{kind.label}: {counted}"}
+    bars(axes, binned(speeds, bins, independent), bins, fill=True, alpha=0.45, **style)
     density = run.units.label("probability density $P(v)$", "1/speed")
     axes.set(ylabel=density, xlabel=run.units.label("speed v", "speed"))
     axes.set(xlim=(0, bins[-1]), ylim=(0, None))
@@ -145,7 +152,8 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
             raise Refused(f"{run.path}: {NEEDED}")
     frames = [late_frames(run, options, warnings) for run in group.runs]
     rows = table(group.runs, frames, options.equilibration)
-    notes = ["Bars: standard errors if all speeds are independent. ± : standard error of the mean."]
+    bars = "Bars: standard errors for the number of independent speeds."
+    notes = [f"{bars} ± : standard error of the mean."]
     return Result(rows, notes=notes, warnings=warnings, values=frames)
 
 
