@@ -243,18 +243,17 @@ unit-tests:  ## unit tests; DEBUG=1 tests=tests/unit/test_X.pf: of a module
 	  "$(if $(PFUNIT_DIR),pFUnit $(PFUNIT_VERSION),the substitute for pFUnit)" \
 	  $(BUILD)/unit_tests $$(sed 's,.*(\(.*\)_suite),$(suites)/\1.pf,' $(T)/tests.inc)
 
-# Shows a command while it runs.
-shown = @$(announce) '$(strip $1)' $1
+# Shows a command while it runs, but not the tables that it prints.
+shown = @quietly() { "$$@" > /dev/null; }; $(announce) '$(strip $1)' quietly $1
 demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	@echo 'make demo, step 1 of 3: packages (half a minute the first time)'
 	@.ci/set-up demo
 	@echo 'make demo, step 2 of 3: program and library (20 s on two idle cores the first time)'
 	@$(MAKE) $(jobs) all library
-	@echo 'make demo, step 3 of 3: three simulations and five pictures (5 s)'
+	@echo 'make demo, step 3 of 3: three simulations, three figures and two films (5 s)'
 	@$(MAKE) $(jobs) demo-crater demo-gas
-	@echo 'In runs/demo: crater.html and gas.html, films for the browser; crater.png, speeds.png, gas.png; the data (*.h5).'
-	@echo 'Next: open runs/demo/crater.html in a browser; make lab (a page with moving disks and sliders);'
-	@echo '      a run of your own, as the README shows.'
+	@echo 'Finished. Open in a browser: runs/demo/crater.html, the film of an impact, or gas.html, that of a gas.'
+	@echo 'The figures crater.png, speeds.png and gas.png are in the same folder. Next: make lab, a page with sliders.'
 
 demo-crater:
 	$(call shown,$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002 --set output.event_log=.true.)
