@@ -173,7 +173,7 @@ def test_the_total_energy_has_a_linear_panel_for_each_time_step(tmp_path, rng, f
         np.testing.assert_array_equal(axes.lines[0].get_ydata(), total)
         assert axes.get_xlabel() == "time (s)"
     first, species, changes = figure.axes[0], figure.axes[3], figure.axes[-1]
-    assert first.get_ylabel() == "energy of all disks (J)" and len(figure.axes) == 3 + 2 + 1
+    assert first.get_ylabel() == "energy (J)" and len(figure.axes) == 3 + 2 + 1
     assert species.get_xscale() == "linear" and figure.axes[4].get_xscale() == "log"
     assert "exact except for rounding" in changes.get_title(loc="left") + changes.get_title()
 

@@ -6,7 +6,7 @@ from matplotlib.container import ErrorbarContainer
 
 import ricochet
 from ricochet.figures.drawing import plt
-from ricochet.figures.sheet import Panel, Sheet, legend_above, smallest_text
+from ricochet.figures.sheet import Panel, Sheet, columns_that_fit, legend_above, smallest_text
 from sampling import mostly
 from synthetic_gases import cooled, falling, gas
 
@@ -169,3 +169,10 @@ def test_a_figure_fits_paper_and_screen(name, analysed):
             alone = result.figure(panel.name)
             assert len(columns_of(alone)) == 1
             plt.close(alone)
+
+
+def test_legends_have_as_many_columns_as_fit_with_their_own_widths():
+    """A long entry does not widen the columns of short ones."""
+    assert columns_that_fit([33, 1, 1], 50) == 3
+    assert columns_that_fit([33, 1, 1], 45) == 2
+    assert columns_that_fit([33, 33], 45) == columns_that_fit([], 45) == 1

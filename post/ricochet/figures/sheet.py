@@ -164,6 +164,14 @@ class Sheet:
         return heights
 
 
+def columns_that_fit(widths: Sequence[float], room: float) -> int:
+    """Return the number of columns of a legend that fit into `room`, all in letters."""
+    counts = range(1, len(widths) + 1)
+    parts = {count: np.array_split(np.array(widths) + HANDLE, count) for count in counts}
+    wide = {count: sum(part.max() for part in own) for count, own in parts.items()}
+    return max((count for count in counts if wide[count] <= room), default=1)
+
+
 def legend_above(axes: Axes, **style: Any) -> None:
     """Add a legend between a panel and its title, where it hides no data."""
     handles, labels = axes.get_legend_handles_labels()
@@ -180,8 +188,7 @@ def legend_above(axes: Axes, **style: Any) -> None:
     widths = [
         large * max(map(letters_of, own)) for own, large in zip(lines, scale, strict=True) if own
     ]
-    widest = max(widths, default=0) + HANDLE
-    columns = max(1, min(len(labels), int(letters / widest)))
+    columns = columns_that_fit(widths, letters)
     place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.3}
     close = {"labelspacing": 0.25, "borderpad": 0.2, "handlelength": 1.6, "columnspacing": 1.2}
     legend = axes.legend(handles, labels, ncols=columns, **place | close | style)

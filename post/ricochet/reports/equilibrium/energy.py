@@ -112,9 +112,10 @@ def draw_total(axes: plt.Axes, run: Run, is_first: bool, is_left: bool) -> None:
     axes.set_title(f"{method(run)}\nlargest change {np.abs(lost).max():.2g}")
     axes.set(xlabel=run.units.label("time"), xlim=(time[0], time[-1]))
     if is_left:
-        axes.set_ylabel(run.units.label("energy of all disks", "energy"))
+        axes.set_ylabel(run.units.label("energy"))
     if is_first:
         axes.set_ylim(min(0, axes.get_ylim()[0]), None)
+        axes.locator_params(axis="y", nbins=4)
         legend_above(axes)
 
 
@@ -149,7 +150,8 @@ def draw_changes(axes: plt.Axes, runs: list[Run]) -> None:
         time, lost = change(run)
         largest = np.maximum(np.maximum.accumulate(np.abs(lost)), EPSILON / 2)
         worst = max(worst, float(largest[-1]))
-        style = {"label": f"{method(run)}: {balance(run)[1]}"} | lone(time[1:])
+        words = balance(run)[1]
+        style = {"label": method(run) + f": {words}" * (words != "total")} | lone(time[1:])
         axes.semilogy(time[1:], largest[1:], color=colour, lw=1.4, **style)
     if not any(run.nature.driven for run in runs):
         axes.set_xscale("log")

@@ -129,8 +129,9 @@ def draw_approach(axes: plt.Axes, group: Group, options: SimpleNamespace, labell
         time = " ± ".join(rounded_to_error(*found.thermalisation))
         label = "thermalisation time " + f"{time} {first.units.time}".rstrip()
         axes.axvline(found.thermalisation.mean, color="0.5", ls=":", lw=1.2, label=label)
-    axes.set(title=f"initial speed {group.key:g},  {caption(group.runs)}", xlim=(0, options.until))
-    axes.set(ylabel=first.units.label("⟨K⟩", "energy"), ylim=(0, None))
+    unit = first.units.name("speed")
+    axes.set(title=f"initial speed {group.key:g} {unit}", xlim=(0, options.until))
+    axes.set(ylabel=first.units.label("kinetic energy", "energy"), ylim=(0, None))
     if labelled:
         axes.set_xlabel(first.units.label("time"))
     else:
@@ -145,7 +146,7 @@ def draw(result: Result) -> Sheet:
         more = {"aspect": 0.34 + 0.05 * (k == last), "share_x": "start1" * (k > 0)}
         given = (group, result.options, k == last)
         rows.append([Panel(f"start{k + 1}", draw_approach, given, **more)])
-    return Sheet(rows)
+    return Sheet(rows, ";  ".join(dict.fromkeys(caption(one.runs) for one in result.groups)))
 
 
 def check(run: Run) -> None:
@@ -173,7 +174,8 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
             warnings.append(f"v0 = {group.key:g}: no T_therm; {why}")
     notes = [
         f"From the thermalisation time on, the means differ by less than {share} for three "
-        "windows. Bars: standard errors of the mean over the runs."
+        "windows. Energies are means per disk over windows of time and over the runs. Bars: "
+        "standard errors of the mean over the runs."
     ]
     return Result(rows, notes=notes, warnings=warnings)
 

@@ -256,7 +256,7 @@ def draw_laws(axes: plt.Axes, result: Result, kind: str, logarithmic: bool) -> N
         draw_histogram(axes, own.values, own.x[-1], colour, "" if logarithmic else label)
         axes.plot(own.x, own.ideal, color=colour, lw=1.4)
         axes.plot(own.x, own.finite, color="black", lw=1.0, ls="--")
-    names = {"speed": "$v^2$", "height": "height h of the centre"}
+    names = {"speed": "v²", "height": "height h of the centre"}
     axes.set_xlabel(run.units.label(names[kind], quantity))
     axes.set_ylabel(run.units.label("probability density", f"1/{quantity}"))
     axes.set_xlim(0, None)
@@ -281,7 +281,7 @@ def draw(result: Result) -> Sheet:
     kt = " ± ".join(rounded_to_error(row["kT"], row["kT_error"]))
     began = result.further[0][0]["equilibrium_from"]
     when = f"t = {began:.4g} to {run.time[-1]:g} {run.units.time}".rstrip()
-    return Sheet(rows, f"{caption([run])},  {when},  kT = {kt}")
+    return Sheet(rows, f"{caption([run])},  {when},  kT = {kt} {run.units.energy}".rstrip())
 
 
 def check(run: Run) -> None:
@@ -319,7 +319,7 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     began = float(run.time[frames[0]])
     told = [{"equilibrium_from": began, "frames": len(frames), "left_out_before": reason}]
     notes = [
-        f"Frames from t = {began:.4g} on; before: {reason}.",
+        f"Frames from t = {began:.4g} {run.units.time}".rstrip() + f" on; before: {reason}.",
         "Fits: kinetic energies {:g} to {:g} kT; mgh = {:g} to {:g} kT or the lid. ".format(
             *SPEED_RANGE, *HEIGHT_RANGE
         )

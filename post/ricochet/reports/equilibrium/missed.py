@@ -115,7 +115,7 @@ def draw_missed(axes: plt.Axes, result: Result) -> None:
         style |= {"marker": "v", "label": "upper limit: mean, not above 0, plus its error"}
         axes.plot(dt[above], (share + error)[above], **style)
     axes.set(xscale="log", yscale="log")
-    axes.set(xlabel=run.units.label("Δt", "time"), ylabel="pair collisions missed [%]")
+    axes.set(xlabel=run.units.label("Δt", "time"), ylabel="pair collisions missed (%)")
     axes.set_xticks(dt, [f"{step:g}" for step in dt], minor=False)
     axes.set_xticks([], minor=True)
     legend_above(axes)

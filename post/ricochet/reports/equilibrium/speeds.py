@@ -39,7 +39,7 @@ EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
 COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
 UNSTEADY = "No steady kT yet: each frame at its own"
 ABOUT_A2 = (
-    "The second Sonine coefficient is 0 for Maxwell's speeds and -1/2 for equal speeds. Each point "
+    "The second Sonine coefficient is 0 for Maxwell's speeds and −1/2 for equal speeds. Each point "
     "is one frame; deviations last for about 2 collisions per disk."
 )
 BARS = "Bars: standard errors for the number of independent speeds"
@@ -146,8 +146,8 @@ class Scale(NamedTuple):
     def law(self) -> str:
         """Return the Maxwell distribution as text for a legend."""
         if self.thermal == 1.0 and "u" in self.label:
-            return "Maxwell, $P(u)=2u\\,\\exp(-u^2)$"
-        return "Maxwell, $P(v)=(mv/kT)\\,\\exp(-mv^2/2kT)$"
+            return "Maxwell, P(u) = 2u exp(−u²)"
+        return "Maxwell, P(v) = (mv/kT) exp(−mv²/2kT)"
 
 
 def scale_of(run: Run, kt: float, unscaled: bool) -> Scale:

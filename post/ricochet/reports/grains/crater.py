@@ -108,7 +108,8 @@ def sizes_of(run: Run, size: Crater) -> list[str]:
     mass, radius = (of[tip] / of[lying].mean() for of in (run.mass, run.radius))
     return [
         f"Projectile: mass {mass:.4g} m, radius {radius:.4g} r, speed {run.speed(0)[tip]:.4g}.",
-        f"Hole: width {size.hole_width:.3f}, depth {size.hole_depth:.3f}. {size.hit} disks hit. "
+        f"Hole (below half of the bed's packing fraction): width {size.hole_width:.3f}, "
+        f"depth {size.hole_depth:.3f}. {size.hit} disks hit. "
         f"{size.displaced} displaced by more than r, from a width {size.width:.3f}, depth "
         f"{size.depth:.3f}.",
     ]

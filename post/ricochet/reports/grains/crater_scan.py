@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 
 from ...analysis.crater import (
     bed,
@@ -37,18 +37,19 @@ from ..tables import measured
 
 #: Axis label of each parameter: text and quantity.
 AXES = {
-    "mass": ("mass of the projectile / mass of a bed disk, $M$", "number"),
-    "speed": ("speed of the projectile $v$", "speed"),
-    "radius": ("radius of the projectile / radius of a bed disk, $R$", "number"),
-    "restitution": ("$1-ξ^2$", "number"),
+    "mass": ("mass of projectile / bed disk, $M$", "number"),
+    "speed": ("projectile speed $v$", "speed"),
+    "radius": ("radius of projectile / bed disk, $R$", "number"),
+    "restitution": ("1 − ξ²", "number"),
 }
-SIZES = {"hit": "disks hit", "displaced": "displaced by more than r"}
-EXTENTS = {"width": "width of the displaced", "depth": "depth of the displaced"}
-EXTENTS |= {"hole_width": "width of the hole", "hole_depth": "depth of the hole"}
+SIZES = {"hit": "disks hit", "displaced": "displaced by > r"}
+EXTENTS = {"width": "width, displaced", "depth": "depth, displaced"}
+EXTENTS |= {"hole_width": "width, hole", "hole_depth": "depth, hole"}
 ALL = SIZES | EXTENTS
 MARKERS = "osDv"
 NONE = Estimate(np.nan, np.nan)  # exponent of a curve without a fit
 ROUNDING = 1e-9  # absolute value below which an exponent counts as 0
+SHORT = 0.3  # decades up to which the ticks of a logarithmic axis have equal distances
 FEWEST_POINTS = 3  # fewest points to which a power law is fitted
 
 
@@ -211,9 +212,8 @@ def power(fit: PowerLaw | None) -> str:
         return ""
     exact = max(abs(fit.exponent), fit.exponent_error) < ROUNDING
     exponent = " ± ".join(rounded_to_error(fit.exponent, fit.exponent_error))
-    exponent = "0" if exact else exponent
-    missed = f", χ²/dof {fit.chi2:.2g}" if fit.missed else ""
-    return f", exponent {exponent}{missed}"
+    exponent = "0" if exact else exponent.replace("-", "−")
+    return exponent + (f", χ²/dof {fit.chi2:.2g}" if fit.missed else "")
 
 
 def draw_size(
@@ -241,11 +241,13 @@ def draw_sizes(
     """Plot several crater sizes against a parameter; colours denote curves or, for one, sizes."""
     scan, run = result.values[axis], result.runs[0]
     shared = [others(axis, curve) for curve in scan]
+    named = axis == next(iter(result.values)) or len(axes.get_figure(root=True).axes) == 1
     varying = [name for name in shared[0] if len({values[name] for values in shared}) > 1]
     for curve, values, shade in zip(scan, shared, colours(len(scan)), strict=True):
         for (name, title), colour, marker in zip(names.items(), own, MARKERS, strict=False):
             fit = fit_of(axis, curve, name)
-            label = "" if varying else title + power(fit)
+            parts = [title] * (named or not fit) + [power(fit)] * bool(fit)
+            label = "" if varying else ": ".join(parts)
             style = {"color": shade if varying else colour, "marker": marker, "label": label}
             draw_size(axes, axis, curve, name, fit, **style)
         if varying:
@@ -278,7 +280,10 @@ def shapes(axes: plt.Axes, x: np.ndarray) -> None:
         axes.set_xticks(np.exp(ticks), minor=False)
         axes.set_xticks([], minor=True)
         axes.xaxis.set_major_formatter("{x:.3g}")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
+        decades = np.log10(max(map(np.max, heights)) / min(map(np.min, heights)))
+        subs = (1, 2, 3, 5) if decades < 1 else (1, 3)
+        few = MaxNLocator(4, steps=[1, 2, 5, 10])
+        axes.yaxis.set_major_locator(few if decades < SHORT else LogLocator(subs=subs))
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_formatter("")
 
@@ -349,7 +354,9 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     found = tables(scans)
     notes = ["Bars: standard errors of the mean over the beds."]
     if found.fits:
-        notes.append("Lines: fits in the range of their points.")
+        notes.append("Lines: fits in the range of their points; their exponents are above.")
+        if len(scans) > 1:
+            notes.append("All rows have the symbols that the first one names.")
     lines = sum(len(ALL) for _, curve in curves_of(scans) if len(curve) > 1)
     if len(found.fits) < lines:
         notes.append("Pale lines join points to which no power law is fitted.")

@@ -206,7 +206,7 @@ def draw_rates(axes: plt.Axes, result: Result) -> None:
     if fit:
         (c, _), (k, dk) = fit["C"], fit["k"]
         line = np.linspace(max(k, 0), 1.05 * x.max(), 200)
-        law = f"{c:.3g} $(D/d - k)^{{3/2}}$"
+        law = f"{c:.3g} (D/d − k)^(3/2)"
         axes.plot(line, c * (line - k) ** EXPONENT, color=COLOURS[0], label=law)
         axes.plot([], [], " ", label=f"$k$ = {k:.2f} ± {dk:.2f}")
     axes.set(xlabel="width of the mouth $D/d$", ylabel="$W \\sqrt{d/g}$")
@@ -251,7 +251,10 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     runs = [run for group in groups for run in group.runs]
     found = measured_rates(runs, options.after)
     fit = fit_of(found)
-    notes = ["Bars and bands: standard errors of the mean, over time and over runs."]
+    notes = [
+        "W: discharged grains per time; D: width of the mouth; d: diameter of a grain.",
+        "Bars and bands: standard errors of the mean, over time and over runs.",
+    ]
     if fit:
         notes.append("Lines: fits, drawn over the fitted range on logarithmic axes.")
     numbers = [{name: value for one in fit for name, value in measured(one, fit[one]).items()}]
