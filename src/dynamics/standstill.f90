@@ -82,7 +82,9 @@ contains
     logical :: yes
 
     if (code > 0) then
-      yes = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species) < 1
+      associate (law => sim%law%between(sim%tag(i)%species, sim%tag(code)%species))
+        yes = law%is_inelastic()
+      end associate
     else
       yes = sim%box%surface(sim%box%surface_of(code))%law%is_inelastic()
     end if

@@ -1,8 +1,8 @@
 !> Contact law of disk-disk collisions, with its variables in `&contact`: restitution for each pair
 !> of species, and the TC model.
 module contact_law
-  use kinds, only: real64
-  use restitution_law, only: restitution_law_rows, restitution_law_t
+  use kinds, only: int32, real64
+  use restitution_law, only: normal_law_t, restitution_law_rows, restitution_law_t
   use tangential_law, only: tangential_law_t, tangential_rows, wall_tangential_rows
   use variable_rows, only: in_motion, moment, not_negative, unit_interval, variable_t
   use wall_law, only: wall_restitution_row, wall_rule_row
@@ -54,6 +54,7 @@ module contact_law
     type(tangential_law_t) :: tangential = tangential_law_t()  !! tangential interaction of two disks
     real(real64) :: inertia = 0.5_real64             !! moment of inertia divided by mass times radius squared
   contains
+    procedure :: between
     procedure :: is_inelastic
     procedure :: loses_energy
     procedure :: can_collapse
@@ -68,6 +69,15 @@ contains
 
     allocate (law%restitution(n, n), source=1.0_real64)
   end function elastic_contacts
+
+  !> Normal contact law of disks of two species.
+  elemental function between(self, a, b) result(law)
+    class(contact_law_t), intent(in) :: self
+    integer(int32), intent(in) :: a, b               !! indices of the species
+    type(normal_law_t) :: law
+
+    law = normal_law_t(self%restitution(a, b), self%by_speed)
+  end function between
 
   !> True if the restitution of any pair of species dissipates energy.
   pure function is_inelastic(self) result(yes)

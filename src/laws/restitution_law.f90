@@ -6,7 +6,7 @@ module restitution_law
   use variable_rows, only: choice_t, in_motion, positive, variable_t
   implicit none
   private
-  public :: chosen_restitution_law, law_choices, restitution_law_rows, restitution_law_t, series_terms
+  public :: chosen_restitution_law, law_choices, normal_law_t, restitution_law_rows, restitution_law_t, series_terms
 
   !> Keywords of the laws by which restitution depends on the impact velocity. For each law,
   !> `series_terms` is the coefficient c of the series in `restitution_law_t` (3/5 for viscoelastic
@@ -50,7 +50,34 @@ module restitution_law
     procedure :: has_elastic_range
   end type restitution_law_t
 
+  !> Normal contact law of two surfaces.
+  type :: normal_law_t
+    !> Coefficient of restitution at the reference velocity of `by_speed`.
+    real(real64) :: restitution = 1.0_real64
+    type(restitution_law_t) :: by_speed = restitution_law_t()
+  contains
+    procedure :: is_inelastic
+    procedure :: coefficient_at
+  end type normal_law_t
+
 contains
+
+  !> True if the restitution dissipates energy.
+  elemental function is_inelastic(self) result(yes)
+    class(normal_law_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%restitution < 1
+  end function is_inelastic
+
+  !> Coefficient of restitution at an impact velocity.
+  elemental function coefficient_at(self, g) result(xi)
+    class(normal_law_t), intent(in) :: self
+    real(real64), intent(in) :: g                    !! normal impact velocity [length/time]
+    real(real64) :: xi
+
+    xi = self%by_speed%restitution_at(self%restitution, g)
+  end function coefficient_at
 
   !> The law with the given keyword; without a keyword, the law of constant restitution.
   pure function chosen_restitution_law(word, speed) result(law)

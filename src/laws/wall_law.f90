@@ -1,7 +1,7 @@
 !> Contact law of walls, with its variables in `&side`, `&obstacle` and `&wall`, and in `&contact`.
 module wall_law
   use kinds, only: real64
-  use restitution_law, only: restitution_law_t
+  use restitution_law, only: normal_law_t
   use tangential_law, only: own_tangential_rows, tangential_law_t
   use variable_rows, only: choice_t, in_motion, positive, unit_interval, variable_t, wall_groups
   implicit none
@@ -68,27 +68,16 @@ module wall_law
     r=1, size(law_rows)), g=1, size(wall_groups))]
 
   !> Contact law of a wall.
-  type :: wall_law_t
-    real(real64) :: restitution = 1.0_real64
+  type, extends(normal_law_t) :: wall_law_t
     integer :: rule = 1                              !! index of the rule in `wall_rules`
-    type(restitution_law_t) :: by_speed = restitution_law_t()
     type(tangential_law_t) :: tangential = tangential_law_t()
     real(real64) :: temperature = 0.0_real64         !! kT of a thermal wall; 0 for other walls [energy]
     real(real64) :: speed = 0.0_real64               !! tangential velocity of the surface [length/time]
   contains
-    procedure :: is_inelastic
     procedure :: stops_disks
   end type wall_law_t
 
 contains
-
-  !> True if the restitution of the wall dissipates energy.
-  elemental function is_inelastic(self) result(yes)
-    class(wall_law_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%restitution < 1
-  end function is_inelastic
 
   !> True if collisions are perfectly inelastic, so that disks do not rebound.
   elemental function stops_disks(self) result(yes)
@@ -109,7 +98,7 @@ contains
     real(real64) :: after(2), approach, restitution
 
     approach = v(1)*normal(1) + v(2)*normal(2)
-    restitution = merge(1.0_real64, law%by_speed%restitution_at(law%restitution, abs(approach)), elastic)
+    restitution = merge(1.0_real64, law%coefficient_at(abs(approach)), elastic)
     if (law%rule == normal_rule) then
       after = v + (restitution*abs(approach) - approach)*normal
     else

@@ -13,7 +13,7 @@
 !> matters only for the tangential impulses of rough disks.
 module clusters
   use kinds, only: int32, real64
-  use restitution_law, only: restitution_law_t
+  use restitution_law, only: normal_law_t
   use tangential_law, only: tangential_impulse, tangential_law_t
   implicit none
   private
@@ -44,8 +44,7 @@ module clusters
     !> Tangential velocity of the first surface relative to the other [length/time].
     real(real64) :: slip = 0.0_real64
     real(real64) :: turn = 0.0_real64      !! angle by which the normal has turned towards the tangent
-    real(real64) :: restitution = 1.0_real64
-    type(restitution_law_t) :: by_speed = restitution_law_t()
+    type(normal_law_t) :: law = normal_law_t()
     type(tangential_law_t) :: tangential = tangential_law_t()
   end type contact_t
 
@@ -145,7 +144,7 @@ contains
 
     associate (contact => self%contact, along => coupling%along(:, next))
       mass = 1/coupling%along(next, next)
-      velocity = -restitution_of(contact(next))*contact(next)%closing
+      velocity = -contact(next)%law%coefficient_at(contact(next)%closing)*contact(next)%closing
       normal = mass*(contact(next)%closing - velocity)
       tangential = tangential_impulse(contact(next)%tangential, self%inertia, mass, contact(next)%slip, normal)
       across = coupling%across(:, next) + (contact(next)%turn - contact%turn)*along
@@ -209,13 +208,5 @@ contains
 
     opening = contact%sliding**2/contact%distance
   end function opening
-
-  !> Coefficient of restitution at the present closing velocity.
-  pure function restitution_of(contact) result(xi)
-    type(contact_t), intent(in) :: contact
-    real(real64) :: xi
-
-    xi = contact%by_speed%restitution_at(contact%restitution, contact%closing)
-  end function restitution_of
 
 end module clusters

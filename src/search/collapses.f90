@@ -271,8 +271,7 @@ contains
         noise = spacing(maxval(abs([p%v, q%v]))) + magnitude(dv)/distance*spacing(maxval(abs([p%x, q%x])))
         if (abs(contact%sliding) <= resolved*noise) contact%sliding = 0
       end associate
-      contact%restitution = sim%law%restitution(sim%tag(member(a))%species, sim%tag(member(b))%species)
-      contact%by_speed = sim%law%by_speed
+      contact%law = sim%law%between(sim%tag(member(a))%species, sim%tag(member(b))%species)
       contact%tangential = sim%law%tangential
     end function contact_of
   end subroutine list_contacts
@@ -324,8 +323,7 @@ contains
         [normal(2), -normal(1)])
       contact%slip = -contact%sliding - disk%radius*sim%spin(i)
       associate (law => sim%box%surface(sim%box%surface_of(code))%law)
-        contact%restitution = merge(1.0_real64, law%restitution, law%temperature > 0)
-        contact%by_speed = law%by_speed
+        if (.not. law%temperature > 0) contact%law = law%normal_law_t
         contact%tangential = law%tangential
       end associate
       contacts = [contacts, contact]
