@@ -23,9 +23,14 @@ contains
   pure function first_values(width, is_integer) result(first)
     integer, intent(in) :: width(:)                  !! number of values of each quantity
     logical, intent(in) :: is_integer(:)             !! whether the quantity has integer values
-    integer :: first(size(width)), k
+    integer :: first(size(width)), next(2), k, which
 
-    first = [(1 + sum(width(:k - 1), is_integer(:k - 1) .eqv. is_integer(k)), k=1, size(width))]
+    next = 1
+    do k = 1, size(width)
+      which = merge(1, 2, is_integer(k))
+      first(k) = next(which)
+      next(which) = next(which) + width(k)
+    end do
   end function first_values
 
   !> Number of samples.

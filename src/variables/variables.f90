@@ -91,7 +91,8 @@ contains
     integer, intent(in) :: one, other        !! rows
     logical :: yes
 
-    yes = any(words_of(table(one)%excludes) == table(other)%name)
+    yes = table(one)%excludes /= ""
+    if (yes) yes = any(words_of(table(one)%excludes) == table(other)%name)
     if (other < one .and. track_of(table(one)%name) /= "") yes = track_of(table(one)%name) == track_of(table(other)%name)
   end function excludes
 
@@ -126,10 +127,19 @@ contains
   pure function words_of(line) result(words)
     character(len=*), intent(in) :: line
     character(len=len(line)), allocatable :: words(:)
-    integer :: i
+    integer :: first, k, n
 
-    allocate (words(count([(line(i:i) /= " " .and. line(i + 1:min(i + 1, len(line))) == " ", i=1, len(line))])))
-    if (size(words) > 0) read (line, *) words
+    n = 0
+    do k = 1, len_trim(line)
+      if (line(k:k) /= " " .and. line(k + 1:min(k + 1, len(line))) == " ") n = n + 1
+    end do
+    allocate (words(n))
+    first = 1
+    do k = 1, n
+      first = first + verify(line(first:), " ") - 1
+      words(k) = line(first:first + index(line(first:)//" ", " ") - 2)
+      first = first + len_trim(words(k))
+    end do
   end function words_of
 
   !> Description of the allowed values, such as `a number > 0` or `'wall' or 'periodic'`.
