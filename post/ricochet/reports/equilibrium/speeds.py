@@ -40,7 +40,7 @@ COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each 
 UNSTEADY = "No steady kT yet: each frame at its own"
 ABOUT_A2 = (
     "The second Sonine coefficient is 0 for Maxwell's speeds and −1/2 for equal speeds. Each point "
-    "is one frame; deviations last for about 2 collisions per disk."
+    "is one frame; deviations are halved about every 2 collisions per disk."
 )
 BARS = "Bars: standard errors for the number of independent speeds"
 OVER_RUNS = "; of the Sonine coefficient: over the runs"
