@@ -72,8 +72,8 @@ def test_the_links_of_a_lesson_lead_to_the_inputs_with_these_titles(page, inputs
         assert key == "input" and title in (f"*{own['title']}*", "this state")
         assert bool(settings) == (title == "this state")
         for variable, value in settings:
-            parts = [*enumerate(value.split(","))]
-            names = {f"{variable}[{k}]": part for k, part in parts} if parts[1:] else {variable: value}
+            names = {f"{variable}[{k}]": part for k, part in enumerate(value.split(","))}
+            names |= {variable: value}
             assert names.keys() & sliders.keys()
             for one in names.keys() & sliders.keys():
                 low, high, *_ = sliders[one]
