@@ -62,7 +62,7 @@ const STOPS = {
 };
 function stopInWords() {
   const rules = Object.keys(STOPS).filter(name => textOf(`stop.${name}`)).map(name => STOPS[name](textOf(`stop.${name}`)));
-  return rules.length ? `Here a run has no end. The input file ends it: ${rules.join(' or ')}.` : '';
+  return rules.length ? `Here a run has no end. The downloaded input runs ${rules.join(' or ')}.` : '';
 }
 
 // Returns the changes of a run in words. The variables of a group that was added are not listed.

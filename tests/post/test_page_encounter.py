@@ -347,7 +347,10 @@ def test_the_energies_of_both_tables_name_their_frame_of_reference(two):
     two.run(CLICK, "centred")
     wait_for(lambda: inside(two, "state.centred"))
     found = [two.run(text, f"section:has(#{name}) h2") for name in ("bodies", "energies")]
-    assert found == ["Momentum and energy, centre-of-mass frame", "Energy per disk, frame of the box"]
+    assert found == [
+        "Momentum and energy, centre-of-mass frame",
+        "Energy per disk, frame of the box",
+    ]
 
 
 def test_momenta_have_the_colours_of_their_disks_and_a_scale(two):
