@@ -58,6 +58,7 @@ contains
     do k = frames, values
       associate (schedule => progress%schedule(k))
         schedule%sampling_t = settings%output%sampling(k)
+        if (.not. schedule%every(by_collisions_per_disk) < never) cycle
         schedule%every(by_collisions) = min(schedule%every(by_collisions), &
           0.5_real64*settings%n_disks()*schedule%every(by_collisions_per_disk))
       end associate
