@@ -63,11 +63,11 @@ objects_in = $(patsubst %.f90,$(BUILD)/%.o,$(notdir $(wildcard $(1:%=src/%/*.f90
 # The modules of the event loop and of random insertion, which are optimised as a whole. Those of its folders that it calls seldom or
 # never are compiled like the others.
 seldom := motions changes clusters collapses rest standstill stop_rules observables sample_values obstacle_cells time_stepped \
-  verlet_list recycle drives
+  verlet_list recycle drives renumbering partition domain_cuts
 hot_objects := $(filter-out $(seldom:%=$(BUILD)/%.o),$(call objects_in,dynamics parallel drives sides laws physics search geometry)) \
   $(patsubst %,$(BUILD)/%.o,random_insertion random_stream sorting memory_hints memory_hints_c)
 once_objects := $(call objects_in,. input variables)
-cold_objects := $(call objects_in,output files)
+cold_objects := $(call objects_in,output files start)
 
 # Unit tests: the same .pf files under pFUnit or the substitute, each in its own folder, with all checks on.
 PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
@@ -161,7 +161,7 @@ $(BUILD)/%_c.o: %.c $(BUILD)/flags
 keep = cat > $@.$$$$; if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
 $(BUILD)/flags: FORCE
-	@echo '$(FC) $(flags) $(if $(usual),$(hot) $(cold) $(once)) $(hints)' | { $(keep); }
+	@echo '$(FC) $(flags) $(if $(usual),$(hot) $(cold) $(once) $(seldom)) $(hints)' | { $(keep); }
 
 # Another pFUnit compiles the tests of its folder again, and another runner links its own: of the program nothing.
 $(BUILD)/runner $(T)/runner: FORCE
