@@ -41,24 +41,37 @@ def replace_lines(name: str, text: str, old: list[str], new: list[str]) -> str:
 
 def add_files(page: str, root: Path) -> None:
     """Write the new files that a page contains."""
-    file = r"`((?:src|post|tests)/\S+)`, a new file:\n\n((?:    .*\n|\n)+)"
-    for name, code in re.findall(file, page):
+    for name, code in new_files(page):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
-        (root / name).write_text(textwrap.dedent(code).rstrip("\n") + "\n")
+        (root / name).write_text(code)
+
+
+def new_files(page: str) -> list[tuple[str, str]]:
+    """Return the names and the contents of the new files that a page contains."""
+    file = r"`((?:src|post|tests)/\S+)`, a new file:\n\n((?:    .*\n|\n)+)"
+    return [
+        (name, textwrap.dedent(code).rstrip("\n") + "\n") for name, code in re.findall(file, page)
+    ]
+
+
+def changed_files(page: str) -> list[tuple[str, str]]:
+    """Return the names of the files that a page changes, each with its changes."""
+    blocks = re.findall(r"^```diff\n(.*?)^```", page, re.M | re.S)
+    change = re.compile(r"^--- (\S+)\n(.*?)(?=^--- |\Z)", re.M | re.S)
+    return [pair for block in blocks for pair in change.findall(block)]
 
 
 def carry_out_recipes(page: str, root: Path) -> int:
     """Apply the changes of the source code described on a page: new files and new lines."""
     add_files(page, root)
     changes = 0
-    for block in re.findall(r"^```diff\n(.*?)^```", page, re.M | re.S):
-        for name, text in re.findall(r"^--- (\S+)\n(.*?)(?=^--- |\Z)", block, re.M | re.S):
-            for lines in map(str.splitlines, text.split("@@\n")):
-                old = [line[1:] for line in lines if line[0] != "+"]
-                new = [line[1:] for line in lines if line[0] != "-"]
-                file = root / name
-                file.write_text(replace_lines(name, file.read_text(), old, new))
-                changes += 1
+    for name, text in changed_files(page):
+        for lines in map(str.splitlines, text.split("@@\n")):
+            old = [line[1:] for line in lines if line[0] != "+"]
+            new = [line[1:] for line in lines if line[0] != "-"]
+            file = root / name
+            file.write_text(replace_lines(name, file.read_text(), old, new))
+            changes += 1
     return changes
 
 
@@ -126,15 +139,33 @@ def look_at_restitution(program, folder):
     assert v.tolist() == pytest.approx([-0.4, 0.4])
 
 
+def all_recipes() -> str:
+    """Return the text of all pages with recipes."""
+    names = "recipes", "recipes-that-add-a-choice", "recipes-that-add-a-file"
+    return "\n".join(path_of(name).read_text() for name in names)
+
+
+def test_the_sizes_of_the_recipes_are_listed():
+    """The table counts the new files and the changed files of each recipe, and their lines."""
+    rows = ["| recipe | new files | lines in them | changed files | lines added to them |"]
+    rows.append("|---|---:|---:|---:|---:|")
+    for title, recipe in re.findall(r"^## (.*)\n((?:(?!## ).*\n)*)", all_recipes(), re.M):
+        new = [code.count("\n") for _, code in new_files(recipe)]
+        changed = changed_files(recipe)
+        if new or changed:
+            added = sum(len(re.findall(r"^\+", text, re.M)) for _, text in changed)
+            rows.append(f"| {title} | {len(new)} | {sum(new)} | {len(changed)} | {added} |")
+    table = "\n".join(rows) + "\n"
+    assert table in all_recipes(), f"the table of docs/explanation/recipes.md must be\n{table}"
+
+
 @pytest.fixture
 def by_recipe(tmp_path):
     """Return a copy of the sources in which all recipes have been applied."""
     for name in ("src", "post", "Makefile", "tests"):
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
-    names = "recipes", "recipes-that-add-a-choice", "recipes-that-add-a-file"
-    pages = (path_of(name).read_text() for name in names)
-    assert carry_out_recipes("\n".join(pages), tmp_path) > 30
+    assert carry_out_recipes(all_recipes(), tmp_path) > 30
     return tmp_path
 
 
