@@ -260,7 +260,8 @@ def draw_sizes(
         fraction = energy_fraction(run)
         label = f"least number hit, $M\\,(1/f - 1)$, $f = {fraction:g}$"
         axes.plot(x, x * (1 / fraction - 1), color="0.4", lw=1, ls=":", label=label)
-    shapes(axes, abscissa(axis, [p.values[axis] for p in chain(*scan)]))
+    low = len(axes.get_figure(root=True).axes) > 2  # several rows
+    shapes(axes, abscissa(axis, [p.values[axis] for p in chain(*scan)]), low)
     same = set.intersection(*(set(others(axis, curve).items()) for curve in scan))
     title = listed({name: v for name, v in others(axis, scan[0]).items() if (name, v) in same})
     axes.set(xlabel=run.units.label(*AXES[axis]), title=title if names is SIZES else "")
@@ -268,8 +269,11 @@ def draw_sizes(
     legend_above(axes)
 
 
-def shapes(axes: plt.Axes, x: np.ndarray) -> None:
-    """If all values are positive, make both axes logarithmic with ticks at the points."""
+def shapes(axes: plt.Axes, x: np.ndarray, low: bool) -> None:
+    """If all values are positive, make both axes logarithmic with ticks at the points.
+
+    A `low` panel has fewer ticks.
+    """
     heights = [line.get_ydata() for line in axes.lines if len(line.get_ydata())]
     if min(x) > 0 and min(map(np.min, heights)) > 0:
         axes.set(xscale="log", yscale="log")
@@ -281,7 +285,7 @@ def shapes(axes: plt.Axes, x: np.ndarray) -> None:
         axes.set_xticks([], minor=True)
         axes.xaxis.set_major_formatter("{x:.3g}")
         decades = np.log10(max(map(np.max, heights)) / min(map(np.min, heights)))
-        subs = (1, 2, 3, 5) if decades < 1 else (1, 3)
+        subs = (1, 3) if low and decades > 1 else (1, 2, 3, 5)
         few = MaxNLocator(4, steps=[1, 2, 5, 10])
         axes.yaxis.set_major_locator(few if decades < SHORT else LogLocator(subs=subs))
         axes.yaxis.set_major_formatter("{x:g}")
@@ -352,9 +356,12 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
     points = [point(group.key, group.runs) for group in groups]
     scans, runs = scanned(points), [run for group in groups for run in group.runs]
     found = tables(scans)
-    notes = ["Bars: standard errors of the mean over the beds."]
+    notes = ["Displaced: by more than the radius r of the disk."]
+    notes.append("Bars: standard errors of the mean over the beds.")
     if found.fits:
-        notes.append("Lines: fits in the range of their points; their exponents are above.")
+        notes.append(
+            "Lines: fits of power laws in the range of their points, with the exponents above."
+        )
         if len(scans) > 1:
             notes.append("All rows have the symbols that the first one names.")
     lines = sum(len(ALL) for _, curve in curves_of(scans) if len(curve) > 1)
