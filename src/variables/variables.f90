@@ -19,8 +19,10 @@ module variables
   character(len=8), parameter :: group_names(12) = [character(len=8) :: &
     "run", "box", "side", "obstacle", "wall", "species", "contact", "drive", "source", "change", "stop", "output"]
 
-  type(variable_t), parameter :: table(*) = [run_rows, boundary_rows, disk_rows, drive_rows, source_rows, change_rows, stop_rows, &
+  type(variable_t), parameter :: rows(*) = [run_rows, boundary_rows, disk_rows, drive_rows, source_rows, change_rows, stop_rows, &
     output_rows]
+  !> No constant, because the compiler would compute expressions that contain it, which takes seconds.
+  type(variable_t), protected, save :: table(size(rows)) = rows
 
 contains
 
