@@ -3,7 +3,7 @@
 module input_groups
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
-  use variables, only: allowed, either, excludes, is_repeated, name_length, row_of, table, words_of
+  use variables, only: allowed, either, excludes, is_repeated, name_length, table, words_of
   use texts, only: growing_text_t, written, written_exactly
   implicit none
   private
@@ -60,6 +60,18 @@ module input_groups
   end type group_t
 
 contains
+
+  !> Index of a variable within `values`.
+  pure function slot_of(self, name) result(k)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    integer :: k
+
+    do k = 1, size(self%values)
+      if (self%values(k)%name == name) return
+    end do
+    k = 0
+  end function slot_of
 
   !> True if the variable has a value.
   pure function is_set(self)
@@ -138,7 +150,7 @@ contains
     integer(int64) :: number
 
     number = otherwise
-    associate (slot => self%values(row_of(self%name, name)))
+    associate (slot => self%values(slot_of(self, name)))
       if (slot%is_set()) read (slot%texts(1), *) number
     end associate
   end function integer_of
@@ -149,7 +161,7 @@ contains
     character(len=*), intent(in) :: name
     real(real64), allocatable :: numbers(:)
 
-    associate (slot => self%values(row_of(self%name, name)))
+    associate (slot => self%values(slot_of(self, name)))
       if (allocated(slot%reals)) then
         numbers = slot%reals
       else
@@ -166,7 +178,7 @@ contains
     real(real64) :: number
 
     number = otherwise
-    associate (slot => self%values(row_of(self%name, name)))
+    associate (slot => self%values(slot_of(self, name)))
       if (allocated(slot%reals)) then
         number = slot%reals(1)
       else if (slot%is_set()) then
@@ -182,7 +194,7 @@ contains
     character(len=:), allocatable :: text
 
     text = ""
-    associate (slot => self%values(row_of(self%name, name)))
+    associate (slot => self%values(slot_of(self, name)))
       if (allocated(slot%texts)) text = trim(slot%texts(1))
     end associate
   end function text_of
@@ -193,7 +205,7 @@ contains
     character(len=*), intent(in) :: name
     logical :: given
 
-    given = self%values(row_of(self%name, name))%given
+    given = self%values(slot_of(self, name))%given
   end function given
 
   !> True if the user has set the variable to an invalid value. The problem has then been reported.
@@ -202,7 +214,7 @@ contains
     character(len=*), intent(in) :: name
     logical :: faulty
 
-    faulty = self%values(row_of(self%name, name))%faulty
+    faulty = self%values(slot_of(self, name))%faulty
   end function faulty
 
   !> Assigns a default name to an obstacle, species or source without a name. The default name of a
@@ -222,7 +234,7 @@ contains
     character(len=*), intent(in) :: name
     character(len=*), intent(in) :: text
 
-    associate (slot => self%values(row_of(self%name, name)))
+    associate (slot => self%values(slot_of(self, name)))
       call slot%clear()
       allocate (slot%texts(1))
       slot%texts(1) = text
@@ -235,7 +247,7 @@ contains
     character(len=*), intent(in) :: name
     real(real64), intent(in) :: numbers(:)
 
-    self%values(row_of(self%name, name))%reals = numbers
+    self%values(slot_of(self, name))%reals = numbers
   end subroutine put_reals
 
   !> Reports a problem with a variable. The message cites the line of the assignment or, without an
@@ -246,7 +258,7 @@ contains
     character(len=*), intent(in) :: what       !! the problem, and the allowed values
     type(problem_list_t), intent(inout) :: problems
 
-    associate (line => self%values(row_of(self%name, name))%line)
+    associate (line => self%values(slot_of(self, name))%line)
       call problems%add(merge(self%line, line, line == 0), trim(self%name)//"."//name, what)
     end associate
   end subroutine complain
@@ -257,7 +269,7 @@ contains
     character(len=*), intent(in) :: name
     type(problem_list_t), intent(inout) :: problems
 
-    associate (slot => self%values(row_of(self%name, name)))
+    associate (slot => self%values(slot_of(self, name)))
       if (.not. slot%given) call self%complain(name, "is missing; give "//allowed(table(slot%row)), problems)
     end associate
   end subroutine demand
