@@ -21,7 +21,8 @@ module variables
 
   type(variable_t), parameter :: rows(*) = [run_rows, boundary_rows, disk_rows, drive_rows, source_rows, change_rows, stop_rows, &
     output_rows]
-  !> No constant, because the compiler would compute expressions that contain it, which takes seconds.
+  !> No constant, because the compiler would compute expressions that contain it, which takes
+  !> seconds.
   type(variable_t), protected, save :: table(size(rows)) = rows
 
 contains
