@@ -78,6 +78,12 @@ def test_captions_name_what_varies(tmp_path):
     assert caption(two) == "N = 2,  ξ = 1,  mass = 2, 4,  3 seeds"
     many = [run(k, packing_fraction=k / 10, radius=k / 100) for k in range(1, 7)]
     assert caption(many) == "N = 2,  ξ = 1,  packing_fraction = 0.1 to 0.6,  6 seeds"
+    few = [run(k, packing_fraction=0.0502655 * k) for k in (1, 2)]
+    assert "packing_fraction = 0.05027, 0.1005" in caption(few)
+    near = [run(k, packing_fraction=0.05026 + k * 1e-6, radius=123456 + k) for k in (1, 2)]
+    assert "packing_fraction = 0.050261, 0.050262" in caption(near)
+    wide = [run(k, mass=123450 + k) for k in (1, 2)]
+    assert "mass = 123451, 123452" in caption(wide)
     random = {"radius": 0.1, "polydispersity": 0.2}
     many = [run(k, packing_fraction=0.3 + k / 1000, **random) for k in range(1, 4)]
     assert caption(many) == "N = 2,  ξ = 1,  3 seeds"

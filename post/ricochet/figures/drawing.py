@@ -120,8 +120,14 @@ def titled(runs: list[Run]) -> str:
 
 
 def listed(values: set[float]) -> str:
-    """Return up to four numbers as text, or the smallest and the largest of more than four."""
-    words = [f"{value:g}" for value in sorted(values)]
+    """Return up to four numbers as text, or the smallest and the largest of more than four.
+
+    Fractions have four digits, or six if they would otherwise be equal.
+    """
+    ordered = sorted(values)
+    words = [f"{value:g}" if value == round(value) else f"{value:.4g}" for value in ordered]
+    if len(set(words)) < len(values):
+        words = [f"{value:g}" for value in ordered]
     return ", ".join(words) if len(words) < 5 else f"{words[0]} to {words[-1]}"
 
 
