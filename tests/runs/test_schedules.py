@@ -9,6 +9,7 @@ bit-identical.
 The environment variables SYSTEMS and SEED set the number of systems and the seed.
 """
 
+import contextlib
 import math
 import os
 import pickle
@@ -71,10 +72,12 @@ class Course:
             time = min(time, MOST_STEPS * draw.step)
         if (drive := simulation.parameters["drive"])["kind"] != "none":
             time = min(time, MOST_KICKS * drive["interval"])
-        ahead = simulation.copy()
-        ahead.advance(time=self.end + time, events=ahead.events + MOST_EVENTS)
-        part = 1 if ahead.time >= self.end + time else rng.random()
-        self.end += part * (min(ahead.time, self.end + time) - self.end)
+        goal, ahead = self.end + time, simulation.copy()
+        with contextlib.suppress(ProgramError):  # then `simulation` fails before `goal`, too
+            ahead.advance(time=goal, events=ahead.events + MOST_EVENTS)
+            if ahead.time < goal:
+                goal = self.end + rng.random() * (ahead.time - self.end)
+        self.end = goal
         if self.steps:  # changes take effect at the ends of steps
             self.end = math.ceil(self.end / draw.step) * draw.step
         simulation.advance(time=self.end)
