@@ -13,8 +13,8 @@ module run_input
   use input_text, only: read_text
   use kinds, only: int64, real64
   use namelist_input, only: override_groups, read_groups
-  use partners, only: n_sides
   use settings, only: run_input_t, settings_t
+  use side_motion, only: side_state_t
   use simulation_state, only: change_t
   use system, only: print_text
   use texts, only: digits, letters, lower_case, shown, text_t, written
@@ -162,7 +162,7 @@ contains
         call own%add(0, fixed_variable(change%lines(k)%text), "cannot change in a running simulation")
     end do
     if (own%count == 0) &
-      call changed_input(before, change%lines, foreseen_box(before), change%time, after, own, stepped)
+      call changed_input(before, change%lines, foreseen_box(before, change%time), change%time, after, own, stepped)
     if (own%count == 0) then
       problem = missing_data(before%settings%system_t, after%settings%system_t)
       if (problem /= "") call own%add(0, "set", problem)
@@ -178,17 +178,15 @@ contains
     before = after
   end subroutine plan_change
 
-  !> The box of an input. The position of a piston is not known in advance and is assumed to be at
-  !> the edge of the box.
-  function foreseen_box(input) result(box)
+  !> The box of an input at the time t since the start. The position of a piston is not known in
+  !> advance and is assumed to be at the edge of the box.
+  pure function foreseen_box(input, t) result(box)
     type(run_input_t), intent(in) :: input
+    real(real64), intent(in) :: t           !! [time]
     type(box_state_t) :: box
-    integer :: k
 
     box%box_t = input%settings%box
-    do k = 1, n_sides
-      if (box%side(k)%is_piston()) deallocate (box%side(k)%motion)
-    end do
+    box%piston = side_state_t(clock=t)
   end function foreseen_box
 
   !> Changes values of an input. A side with a new motion starts it at its present position.
@@ -246,7 +244,7 @@ contains
     do k = 1, int(made)
       before = after
       associate (change => input%settings%schedule(k))
-        call changed_input(before, change%lines, foreseen_box(before), change%time, after, problems, stepped=.true.)
+        call changed_input(before, change%lines, foreseen_box(before, change%time), change%time, after, problems, stepped=.true.)
       end associate
     end do
     call fold(after%given_groups)
