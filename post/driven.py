@@ -20,10 +20,12 @@ table (a row for each input and species)
   kT_x, kT_y          components of the temperature [energy]
   deviation           standard deviation of the width; theory_deviation: predicted value
   enthalpy_change, momentum_change    largest relative changes of the conserved quantities
+  loss                energy lost per collision / value for independent velocities (white noise)
   theory, ratio       predicted value of `late`, and late / theory
 
 theories (for equal disks)
-  temperature         white noise balanced by dissipation (van Noije and Ernst 1998)
+  temperature         white noise balanced by dissipation of independent velocities
+                      (van Noije and Ernst 1998); a warning says where these are correlated
   temperature         elastic disks: adiabat of a slowly moving side
   share               dilute gas in two chambers (after Eggers 1999)
   width               elastic disks: mean width at constant enthalpy

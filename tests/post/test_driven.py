@@ -39,6 +39,26 @@ def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
     assert demon_law(simulated(quiet + "&stop time = 1 /")) == pytest.approx(expected)
 
 
+def test_correlated_velocities_are_the_reason_of_a_temperature_above_the_theory(simulated):
+    text = """&box boundary = 'periodic', 'periodic' / &drive kind = 'noise' interval = 0.002
+    strength = 1 / &species count = 400 packing_fraction = {} temperature = 1 /
+    &contact restitution = {} / &stop time = 2 / &output observables_every_time = 0.01 /"""
+    dilute, dense = (
+        ricochet.analyse("driven", simulated(text.format(*one), name=f"{one[1]}"))
+        for one in ((0.02, 0.9), (0.2, 0.6))
+    )
+    reason = "less energy than for independent velocities"
+    assert not any(reason in warning for warning in dilute.warnings)
+    assert any(reason in warning for warning in dense.warnings)
+    for result, most in ((dilute, np.inf), (dense, 0.9)):
+        (row,) = result.table
+        # heating balances dissipation: T^(3/2) is inversely proportional to the loss per collision
+        within = 4 * (row["ratio_error"] + row["loss_error"])
+        assert row["ratio"] == pytest.approx(row["loss"] ** (-2 / 3), abs=within)
+        assert row["loss"] < most and row["ratio"] < 1.25
+    assert dilute.table[0]["loss"] == pytest.approx(1, abs=4 * dilute.table[0]["loss_error"])
+
+
 def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated, tmp_path, capsys):
     text = """&side name = 'top' motion = 'constant_velocity' velocity = 0.02
     start_time = 1 end_time = 16 /

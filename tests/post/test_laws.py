@@ -27,6 +27,21 @@ def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_poin
     assert np.isnan(hd.simulated(0.7)) and hd.simulated_finite(0.1, 100) < hd.simulated(0.1)
 
 
+def test_published_pressures_are_those_of_the_number_of_disks():
+    """The reference is the 1/N correction of thermodynamics, from Henderson's equation."""
+    eta, step = np.append(np.arange(1, 13) / 20, 0.647), 1e-3
+
+    def slope(x):
+        return np.diff([y * hd.henderson(y) for y in (x - step, x + step)], axis=0)[0]
+
+    shift = -eta / (4 * step) * np.log(slope(eta + step) / slope(eta - step))
+    for count in (100, 1024):
+        finite, infinite = ([hd.published(x, count, one) for x in eta] for one in (True, False))
+        found = count * np.subtract(finite, infinite)
+        np.testing.assert_allclose(found, shift, rtol=0.06)
+        np.testing.assert_allclose(found[:8], shift[:8], rtol=0.01)
+
+
 def test_adiabats_are_those_of_the_room_for_centres_and_of_the_equation_of_state():
     widths, thin = np.array([2, 1.3, 0.9]), 1e-3  # number of disks, as a real number
     room = (widths[0] - 0.1) / (widths - 0.1)

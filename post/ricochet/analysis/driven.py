@@ -7,6 +7,7 @@ import numpy as np
 from ..predictions import hard_disks, theory
 from ..reading.nature import ROUNDING, Refused
 from ..reading.reader import SIDES, Run
+from .statistics import SeriesMean, correlated_mean
 from .structure import largest_cluster
 from .thermodynamics import packing
 
@@ -55,6 +56,26 @@ def noise_law(run: Run) -> float | None:
         return None
     gas = packing(run), 2 * run.radius[0], run.mass[0]
     return hard_disks.noise_temperature(float(drive["strength"]), run.restitution, *gas)
+
+
+def collision_loss(run: Run) -> SeriesMean:
+    """Return the energy lost per collision, over its value for independent Maxwellian velocities.
+
+    This value is (1 - xi^2) kT. The second half of the run is used. If the velocities of colliding
+    disks are correlated, as in a flow, a collision dissipates less.
+    """
+    time, kt = temperature(run)[""]
+    late = time >= (time[0] + time[-1]) / 2
+    lost, collisions, kt = (
+        each[late]
+        for each in (
+            run.observable("dissipated_energy").value,
+            run.collisions_per_disk.value * run.n_disks / 2,
+            kt,
+        )
+    )
+    expected = (1 - run.restitution**2) * (kt[1:] + kt[:-1]) / 2 * np.diff(collisions)
+    return correlated_mean(np.diff(lost), expected)
 
 
 def temperature_law(run: Run) -> np.ndarray | float | None:

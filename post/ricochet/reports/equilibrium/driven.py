@@ -23,6 +23,7 @@ from ..tables import measured, over_runs, with_all_columns
 
 MOST_PICTURES = 3
 POINTS, FINE = 60, 1000  # points of a curve, and of a curve with fluctuations of interest
+CORRELATED = 0.03  # share of the energy loss per collision whose absence causes a warning
 SMALLEST = 2.2  # smallest diameter of a disk in a picture [points]
 LINES = ("-", "-.", ":")  # line styles of the inputs if colours denote species
 Law = np.ndarray | float | Room | None
@@ -146,6 +147,21 @@ def deviations(
     return row | dict(zip(("enthalpy_change", "momentum_change"), changes, strict=True))
 
 
+def losses(runs: list[Run], about: str, warnings: list[str]) -> dict[str, float | None]:
+    """Return the table cells of the energy lost per collision, and add to `warnings`.
+
+    The theory of noise-driven gases assumes that the velocities of colliding disks are independent.
+    """
+    loss = combine_runs([driven.collision_loss(run) for run in runs])
+    if 1 - loss.mean > max(CORRELATED, 3 * loss.error):
+        warnings.append(
+            f"{about}: a collision dissipates {100 * (1 - loss.mean):.1f} ± {100 * loss.error:.1f} "
+            "% less energy than for independent velocities, which the theory assumes; kT therefore "
+            "exceeds the theory"
+        )
+    return measured("loss", loss)
+
+
 def row_of(
     group: Group, species: str, show: str, compared: Callable, warnings: list[str]
 ) -> dict[str, Any]:
@@ -161,6 +177,8 @@ def row_of(
     mean, error = row["late"], row["late_error"]
     if show == "temperature" and not species:
         row |= components(group.runs)
+        if all(driven.noise_law(run) is not None for run in group.runs):
+            row |= losses(group.runs, about, warnings)
     if isinstance(law, Room):
         row |= deviations(group.runs, law, mean, halves)
         law = law.mean
