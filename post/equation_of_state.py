@@ -12,9 +12,9 @@ panels
   deviation    relative deviation from the reference
 
 table (a row for each packing fraction)
-  Z_virial, Z_rate, Z_walls    compressibility factor from each method (-: does not apply)
+  Z_virial, Z_rate, Z_walls    compressibility factor from each method (none, or -: does not apply)
   samples                      effective number of independent samples of the virial
-  Z_reference                  published value
+  Z_reference                  published value; in a periodic box for the number of disks of the run
 
 refuses
   gravity, inelastic disks, unequal temperatures, different distributions of radii

@@ -46,7 +46,8 @@ def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp
         np.testing.assert_allclose(found[y].mean[early], found[law][early], rtol=0.2)
     assert np.isnan(rate.error), "of a single run"
     drawn(tmp_path, "haff", bulk[2])
-    drawn(tmp_path, "equation_of_state", *bulk[:2])
+    row = drawn(tmp_path, "equation_of_state", *bulk[:2])[0]
+    assert "Z_rate" in row and "Z_walls" not in row, "a periodic box has no walls"
 
 
 def test_panels_of_ratios_that_share_an_axis_hold_both_curves(simulated):

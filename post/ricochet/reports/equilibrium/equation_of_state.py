@@ -16,7 +16,7 @@ from ..groups import Group, by_packing
 from ..options import shared
 from ..registry import Analysis
 from ..result import Result
-from ..tables import columns, measured, over_runs
+from ..tables import columns, over_runs, with_all_columns
 
 UNLIKE = 0.02  # largest difference of <r>^2 / <r^2> within a figure
 WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the walls"}
@@ -36,7 +36,7 @@ def likeness(runs: list[Run]) -> float:
 def table(groups: list[Group], skip: float | None) -> tuple[list[dict[str, Any]], list[str]]:
     """Return a row for each packing fraction, and a list of warnings.
 
-    Cells are empty where a method does not apply.
+    Cells are empty where a method does not apply; a method that applies nowhere has no column.
     """
     rows, warnings = [], []
     alike = likeness([run for group in groups for run in group.runs])
@@ -45,15 +45,15 @@ def table(groups: list[Group], skip: float | None) -> tuple[list[dict[str, Any]]
         row = {"packing": eta, "runs": len(same)}
         found = [z_ways(run, skip) for run in same]
         for name, way in WAYS.items():
-            members, about = [one[name] for one in found if name in one], f"η = {eta:g}, {way}"
-            cells = over_runs(f"Z_{name}", members, warnings, about) if members else {}
-            row |= cells if len(members) == len(same) else measured(f"Z_{name}", None)
+            if all(name in one for one in found):
+                members = [one[name] for one in found]
+                row |= over_runs(f"Z_{name}", members, warnings, f"η = {eta:g}, {way}")
         row["samples"] = round(combine_runs([one["virial"] for one in found]).samples, 1)
         z = hard_disks.published(eta, same[0].n_disks, bool(same[0].periodic.all()))
         z = hard_disks.of_sizes(z, eta, alike)
         known = np.isfinite(z) and (alike == 1 or eta <= hard_disks.FLUID[-1, 0])
         rows.append(row | {"Z_reference": z if known else None})
-    return rows, warnings
+    return with_all_columns(rows), warnings
 
 
 def cells(result: Result) -> dict[str, np.ndarray]:
@@ -77,8 +77,8 @@ def draw_points(axes: plt.Axes, found: dict[str, np.ndarray], deviations: bool) 
     """Plot Z by each method, or its deviation from the reference in percent."""
     eta, expected = found["packing"], found["Z_reference"]
     for (name, way), marker, colour in zip(WAYS.items(), "oxs", COLOURS, strict=False):
-        z, error = found[f"Z_{name}"], found[f"Z_{name}_error"]
-        if not np.isnan(z).all():
+        if f"Z_{name}" in found:
+            z, error = found[f"Z_{name}"], found[f"Z_{name}_error"]
             style = {"ls": "", "marker": marker, "mfc": "none", "color": colour, "ms": 6}
             if deviations:
                 axes.errorbar(eta, 100 * (z / expected - 1), 100 * error / expected, **style)
@@ -90,7 +90,7 @@ def draw_z(axes: plt.Axes, result: Result) -> None:
     """Plot Z with published equations of state."""
     (alike, fluid, henderson, published), found = fluids(result), cells(result)
     rough = "Henderson 1975" if alike == 1 else "Santos et al. 1999, from Henderson's equation"
-    label = "Kolafa and Rottner 2006; up to 0.65 Erpenbeck and Luban 1985; then this program"
+    label = "Kolafa, Rottner 2006; to 0.648 Erpenbeck, Luban 1985; then this program"
     label = label if alike == 1 else "Santos et al. 1999, from simulations of equal disks"
     axes.plot(fluid, henderson, color="0.6", label=rough)
     axes.plot(fluid, published, color="black", lw=1, label=label)
@@ -100,7 +100,7 @@ def draw_z(axes: plt.Axes, result: Result) -> None:
         axes.plot(solid, hard_disks.crystal(solid), color="black", lw=1, ls="--", label=label)
     draw_points(axes, found, deviations=False)
     # determined by the data, because the curves diverge
-    most = np.nanmax([found[f"Z_{name}"] for name in WAYS])
+    most = np.nanmax([found[f"Z_{name}"] for name in WAYS if f"Z_{name}" in found])
     axes.set(ylabel="$Z = P\\,/\\,(n\\,kT)$", xlim=(0, 0.05 + max(found["packing"])))
     if most > 3:
         axes.semilogy()
