@@ -54,6 +54,13 @@ def test_a_sweep_and_the_script_go_on_with_each_others_members(tmp_path):
     assert [*sweep(f"{text}! changed", VALUES, tmp_path).wall_time] == [*again.wall_time]
 
 
+def test_a_sweep_uses_only_the_cores_that_it_was_assigned():
+    """A job on a cluster may use only some cores of its machine."""
+    one = "os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
+    code = f"import os; {one}; from ricochet.running.ensembles import cores; print(cores())"
+    assert ran(sys.executable, "-c", code).stdout.split() == ["1"]
+
+
 @pytest.mark.usefixtures("_tools")
 def test_finished_members_are_extended_with_the_same_bits(program, tmp_path):
     """This happens if the sweep has a later end."""

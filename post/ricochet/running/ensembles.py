@@ -70,7 +70,7 @@ def sweep(
     folder : str or Path
         folder for the files of the member runs
     executor : concurrent.futures.Executor, optional
-        executor whose processes can access the folder [all cores of this machine]
+        executor whose processes can access the folder [all cores that this process may use]
 
     Returns
     -------
@@ -119,7 +119,7 @@ def sweep(
     for left in folder.glob(".sweep * * *"):
         wanted(left)
     mark.touch()
-    pool, waiting = executor or ThreadPoolExecutor(os.cpu_count()), []
+    pool, waiting = executor or ThreadPoolExecutor(cores()), []
     try:
         for name, own in overrides.items():
             waiting.append(pool.submit(run_member, folder, name, own, mark))
@@ -132,6 +132,13 @@ def sweep(
         if executor is None:
             pool.shutdown()
     return ensemble(folder)
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use, such as those of a cluster's job."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def choices_of(values: Mapping[str, Any]) -> dict[str, list[Any]]:
