@@ -68,8 +68,10 @@ def hdf5_file(path: Path) -> h5py.File:
         raise RunError(f"{path}: no permission to read") from None
     except OSError as problem:
         if "locking flag" in str(problem) or "already open" in str(problem):
-            why = "this process has opened it with another mode or lock; close it there first"
-            raise RunError(f"{path}: {why}") from None
+            remedy = 'close it there first, or open it with h5py.File(path, "r", locking=False)'
+            raise RunError(
+                f"{path}: this process has opened it to write, or with a lock; {remedy}"
+            ) from None
         if path.suffix == ".nml":
             command = f"build/ricochet {path} writes runs/{path.stem}.h5"
             raise RunError(f"{path}: is an input file; give its output: {command}") from None
