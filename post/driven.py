@@ -11,12 +11,11 @@
 --show cluster      fraction of the disks in the largest cluster (gaps below a tenth of a diameter)
 
 panels
-  curves              a line for each run; dashed: theory, see below
+  curves              a line for each run; dashed: theory
   picture1 ...        first and last frame of one input, last frames of two or three inputs
 
-table (a row for each input and species)
-  late                mean over the second half of the run (share: of the fuller half of the box)
-  late_error          from the fluctuations in time or, if this is larger, the scatter of the runs
+table (a row for each input and species; "heavy / light": ratio of their temperatures)
+  late, samples       mean over the second half (share: in the fuller half); independent samples
   kT_x, kT_y          components of the temperature [energy]
   deviation           standard deviation of the width; theory_deviation: predicted value
   enthalpy_change, momentum_change    largest relative changes of the conserved quantities
@@ -24,8 +23,7 @@ table (a row for each input and species)
   theory, ratio       predicted value of `late`, and late / theory
 
 theories (for equal disks)
-  temperature         white noise balanced by dissipation of independent velocities
-                      (van Noije and Ernst 1998); a warning says where these are correlated
+  temperature         white noise, independent velocities (van Noije and Ernst 1998)
   temperature         elastic disks: adiabat of a slowly moving side
   share               dilute gas in two chambers (after Eggers 1999)
   width               elastic disks: mean width at constant enthalpy

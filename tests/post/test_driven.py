@@ -59,6 +59,19 @@ def test_correlated_velocities_are_the_reason_of_a_temperature_above_the_theory(
     assert dilute.table[0]["loss"] == pytest.approx(1, abs=4 * dilute.table[0]["loss_error"])
 
 
+def test_the_temperature_ratio_of_a_driven_mixture_is_listed(simulated):
+    text = """&box boundary = 'periodic', 'periodic' / &drive kind = 'noise' interval = 0.002
+    strength = 1 / &species name = 'heavy' count = 100 packing_fraction = 0.05 mass = 4
+    temperature = 1 / &species name = 'light' count = 100 packing_fraction = 0.05 temperature = 1 /
+    &contact restitution = 0.8 / &stop time = 5 / &output observables_every_time = 0.05 /"""
+    runs = [simulated(text, f"run.seed={seed}", name=f"{seed}") for seed in (1, 2)]
+    rows = {row["species"]: row for row in ricochet.analyse("driven", runs).table}
+    ratio, kinds = rows["heavy / light"], [rows[name]["late"] for name in ("heavy", "light")]
+    assert ratio["late"] == pytest.approx(kinds[0] / kinds[1], rel=0.01)
+    assert 0 < ratio["late_error"] < 0.1 * ratio["late"] and ratio["samples"] > 4
+    assert ratio["theory"] is None and ratio["late"] > 1.2
+
+
 def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated, tmp_path, capsys):
     text = """&side name = 'top' motion = 'constant_velocity' velocity = 0.02
     start_time = 1 end_time = 16 /

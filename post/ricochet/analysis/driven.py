@@ -9,7 +9,7 @@ from ..reading.nature import ROUNDING, Refused
 from ..reading.reader import SIDES, Run
 from .statistics import SeriesMean, correlated_mean
 from .structure import largest_cluster
-from .thermodynamics import packing
+from .thermodynamics import lightest_and_heaviest, packing
 
 GAP = 0.1  # largest gap between neighbours in a cluster [mean diameters]
 TimeSeries = tuple[np.ndarray, np.ndarray]  # times (S,) and values (S,)
@@ -30,6 +30,23 @@ def temperature(run: Run) -> Curves:
             time, value = run.observable(f"{kind.name}/temperature")
             curves[kind.name] = time, value * count / (count - 1)
     return curves
+
+
+def species_ratio(run: Run) -> SeriesMean | None:
+    """Return the temperature of the heaviest species over that of the lightest, or None.
+
+    Both are averaged over the second half of the run. None is returned if all masses are equal, or
+    if one of the two species has a single disk.
+    """
+    if len({kind.mass for kind in run.by_species}) == 1:
+        return None
+    curves = temperature(run)
+    names = [run.names[k] for k in reversed(lightest_and_heaviest(run))]
+    if not curves.keys() >= {*names}:
+        return None
+    time, _ = curves[""]
+    late = time >= (time[0] + time[-1]) / 2
+    return correlated_mean(*(curves[name][1][late] for name in names))
 
 
 def components(run: Run) -> Curves:

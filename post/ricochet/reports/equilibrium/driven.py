@@ -125,6 +125,12 @@ def members_of(group: Group, species: str, show: str, halves: list[np.ndarray]) 
     return [m._replace(error=np.nan) if driven.keeps_energy(run) else m for m, run in pairs]
 
 
+def late_cells(members: list[SeriesMean], warnings: list[str], about: str) -> dict[str, Any]:
+    """Return the table cells of a mean over the second halves, and add to `warnings`."""
+    samples = round(combine_runs(members).samples, 1)
+    return over_runs("late", members, warnings, about) | {"samples": samples}
+
+
 def components(runs: list[Run]) -> dict[str, float | None]:
     """Return the table cells of kT_x and kT_y, if available."""
     if not all("kinetic_tensor" in run.observables for run in runs):
@@ -170,7 +176,7 @@ def row_of(
     halves = [late(curve, compared) for curve in curves]
     about = ", ".join(filter(None, (show, group.key, species)))
     row = {"input": group.key or None, "species": species or None, "runs": len(curves)}
-    row |= over_runs("late", members_of(group, species, show, halves), warnings, about)
+    row |= late_cells(members_of(group, species, show, halves), warnings, about)
     if any(map(has_trend, halves)):
         warnings.append(f"{about}: still increases or decreases; 'late' is not steady")
     law = None if species else group.values.law
@@ -186,6 +192,16 @@ def row_of(
         law = float(np.mean(late((curves[0][0], law), np.asarray)))
     ratio = law and Estimate(mean / law, error / law)
     return row | {"theory": law} | measured("ratio", ratio)
+
+
+def ratio_rows(group: Group, warnings: list[str]) -> list[dict[str, Any]]:
+    """Return a table row with the ratio of the temperatures of two species, if there is one."""
+    members = [driven.species_ratio(run) for run in group.runs]
+    if None in members:
+        return []
+    about = ", ".join(filter(None, ("temperature ratio", group.key)))
+    row = {"input": group.key or None, "species": "heavy / light", "runs": len(members)}
+    return [row | late_cells(members, warnings, about)]
 
 
 # --- figure ---
@@ -288,6 +304,8 @@ def compute(groups: list[Group], options: SimpleNamespace) -> Result:
         for group in groups
         for species in group.values.tracks
     ]
+    if options.show == "temperature":
+        rows += [row for group in groups for row in ratio_rows(group, warnings)]
     notes = [f"A line for each run, through means over 1/{quantity.points} of it."]
     return Result(with_all_columns(rows), notes=notes, warnings=warnings)
 
