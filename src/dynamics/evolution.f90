@@ -1,8 +1,10 @@
 !> Abstract type of all dynamics (event-driven, time-stepped, parallel), as used by the timeline.
 module evolution
   use kinds, only: int32, int64, never, real64, unlimited
+  use entries, only: awaits_entry
   use errors, only: error_t
   use event_log, only: event_log_t
+  use rest, only: is_at_rest
   use simulation_state, only: simulation_t
   use tally, only: dissipated, tally_t
   implicit none
@@ -30,6 +32,7 @@ module evolution
     procedure :: reached
     procedure :: outgrown
     procedure :: watches
+    procedure :: rests
   end type limits_t
 
   type, abstract :: evolution_t
@@ -106,6 +109,18 @@ contains
 
     yes = self%dissipated < huge(self%dissipated)
   end function watches
+
+  !> True if the disks are at rest and this ends the run. The test is needed without gravity,
+  !> because disks at rest then have no events. No epoch ends, and the test at the end of an epoch
+  !> is never made.
+  pure function rests(self, sim) result(yes)
+    class(limits_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = self%at_rest .and. .not. awaits_entry(sim)
+    if (yes) yes = is_at_rest(sim)
+  end function rests
 
   !> Warning about settings that are valid but rarely sensible with this dynamics; empty if there
   !> are none.

@@ -30,7 +30,6 @@ module stop_rules
   contains
     procedure :: applied_to
     procedure :: is_met
-    procedure :: rests
     procedure :: too_cold
     procedure :: is_over
     procedure :: share
@@ -72,18 +71,6 @@ contains
     yes = has_come_to_rest(sim)
     if (.not. yes) yes = stands_still(sim) .and. is_at_rest(sim)
   end function is_met
-
-  !> True if the disks are at rest and the input contains the stop rule `at_rest`. This test is
-  !> needed without gravity, because disks at rest then have no events. No epoch ends, and the test
-  !> at the end of an epoch is never made.
-  pure function rests(self, sim) result(yes)
-    class(stop_rule_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    logical :: yes
-
-    yes = self%at_rest .and. .not. awaits_entry(sim)
-    if (yes) yes = is_at_rest(sim)
-  end function rests
 
   !> True if, at the start of an epoch, rounding errors dominate the kinetic energy relative to the
   !> mean velocity. Only a system that would cool for ever, inelastic disks in a periodic box, can

@@ -34,7 +34,10 @@ contains
 
     do while (.not. (limits%reached(sim%tally) .or. sim%has_reached(limits%time) .or. is_full(log)))
       call advance_once(evolution, sim, limits, error, log)
-      if (allocated(error) .or. (evolution%idle .and. .not. limits%time < never)) return
+      if (allocated(error)) return
+      if (evolution%idle) then
+        if (limits%rests(sim) .or. .not. limits%time < never) return
+      end if
       if (stop_requested()) return
     end do
   end subroutine advance
@@ -114,10 +117,10 @@ contains
       end if
     end subroutine continue_with
 
-    !> If no further event can occur, advances the time to the next action or, without one, to the
-    !> last collision or sample.
+    !> If no further event can occur, advances the time to the next action or, without one or if the
+    !> disks have come to rest, to the last collision or sample.
     subroutine wait()
-      if (due < last_time) then
+      if (due < last_time .and. .not. limits%rests(sim)) then
         sim%now = max(sim%now, until)
       else      ! a stale event or the end of an epoch may have advanced the time
         sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%box%epoch)

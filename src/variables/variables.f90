@@ -23,7 +23,7 @@ module variables
     output_rows]
   !> No constant, because the compiler would compute expressions that contain it, which takes
   !> seconds.
-  type(variable_t), protected, save :: table(size(rows)) = rows
+  type(variable_t), protected :: table(size(rows)) = rows
 
 contains
 

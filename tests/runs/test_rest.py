@@ -126,6 +126,24 @@ def test_without_gravity_disks_are_at_rest_when_none_moves(ricochet, tmp_path):
     assert "\ntime = 1\n" in run.stdout and "\nkinetic_energy = 0\n" in run.stdout
 
 
+@pytest.mark.parametrize(
+    "more", ["stop.time=9", "stop.events=9", "output.frames_every_time=0.4", "run.threads=2"]
+)
+def test_without_gravity_the_run_ends_with_the_last_collision_whatever_else_is_due(
+    ricochet, tmp_path, more
+):
+    """The disk reaches the right side at x = 0.9 after 0.75, and stops there."""
+    write_input(
+        tmp_path,
+        """&species radius = 0.1 position = 0.15, 0.5 velocity = 1, 0 /
+        &contact wall_restitution = 0 / &stop at_rest = .true. /""",
+    )
+    run = ricochet(*COMMAND, f"--set={more}")
+    assert run.returncode == FINISHED and "\ntime = 0.75\n" in run.stdout
+    disk = Simulation(tmp_path / "gas.nml").advance(time=0.5).advance(time=9)
+    assert disk.time == 0.75
+
+
 def test_at_rest_is_no_rule_where_it_is_false(ricochet, tmp_path):
     write_input(tmp_path, BALL.format(height=2, restitution=0.5, more=""))
     run = ricochet(*COMMAND, "--set=stop.at_rest=.false.")
