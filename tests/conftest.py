@@ -17,7 +17,7 @@ from processor_times import (  # noqa: F401 (pytest finds its hooks here)
     slowest_tests,
 )
 from signs_of_life import SignsOfLife
-from whole_runs import ran, within
+from whole_runs import choose_build, ran, within
 
 # Processes started by a shell in the background ignore these signals by default.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -29,7 +29,9 @@ ROOM = 4e9  #: space for the files of the tests [bytes]
 
 @pytest.hookimpl(trylast=True)  # after the terminal reporter exists
 def pytest_configure(config):
-    """Show signs of life, and keep the files of the tests in memory if possible."""
+    """Choose the program, show signs of life, and keep files in memory if possible."""
+    if missing := choose_build():
+        raise pytest.UsageError(missing)
     terminal = config.pluginmanager.get_plugin("terminalreporter")
     if terminal and not hasattr(config, "workerinput"):
         config.pluginmanager.register(SignsOfLife(terminal))

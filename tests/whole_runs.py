@@ -121,6 +121,22 @@ def environment(**more) -> dict[str, str]:
     return own | {name: str(value) for name, value in more.items()}
 
 
+def choose_build() -> str:
+    """Make RICOCHET and RICOCHET_LIBRARY absolute, because tests change the folder.
+
+    Without RICOCHET_LIBRARY, the libraries beside the program are tested. The result says which
+    program is missing, or is empty.
+    """
+    if program := os.environ.get("RICOCHET"):
+        os.environ["RICOCHET"] = str(Path(program).resolve())
+        os.environ.setdefault("RICOCHET_LIBRARY", str(Path(program).resolve().parent))
+        if not os.access(program, os.X_OK):
+            return f"RICOCHET: no program at {program}; run make first"
+    if libraries := os.environ.get("RICOCHET_LIBRARY"):
+        os.environ["RICOCHET_LIBRARY"] = str(Path(libraries).resolve())
+    return ""
+
+
 def ran(*command, check=False, **options) -> subprocess.CompletedProcess:
     """Run a command, and return it with its output."""
     options = {"capture_output": True, "text": True, "timeout": PATIENCE, **options}

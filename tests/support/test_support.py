@@ -16,7 +16,7 @@ sys.path.insert(0, str(SUPPORT))
 from check_style import problems_of  # noqa: E402
 from translate_pf import Refused, translate  # noqa: E402
 
-from whole_runs import environment, executable, ran, with_parent  # noqa: E402
+from whole_runs import choose_build, environment, executable, ran, with_parent  # noqa: E402
 
 RUNNERS = ["", os.environ["PFUNIT_DIR"]] if os.environ.get("PFUNIT_DIR") else [""]
 FILE = """module test_it
@@ -412,3 +412,19 @@ def test_a_process_ends_with_its_parent_even_if_that_is_killed():
         assert process.stdout.readline() == "lives\n"
         process.kill()
         assert process.stdout.read() == ""
+
+
+def test_the_libraries_under_test_are_those_beside_the_program(tmp_path, monkeypatch):
+    """Tests change the folder, so that relative paths become absolute ones."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "build").mkdir()
+    executable(tmp_path / "build" / "ricochet", "true")
+    monkeypatch.setenv("RICOCHET", "build/ricochet")
+    monkeypatch.delenv("RICOCHET_LIBRARY", raising=False)
+    assert choose_build() == ""
+    assert os.environ["RICOCHET"] == f"{tmp_path}/build/ricochet"
+    assert os.environ["RICOCHET_LIBRARY"] == f"{tmp_path}/build"
+    monkeypatch.setenv("RICOCHET_LIBRARY", "other")
+    assert choose_build() == "" and os.environ["RICOCHET_LIBRARY"] == f"{tmp_path}/other"
+    monkeypatch.setenv("RICOCHET", "nothing")
+    assert choose_build() == "RICOCHET: no program at nothing; run make first"
