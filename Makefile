@@ -236,7 +236,8 @@ wheel:
 	@PATH="$$PWD/.venv/bin:$$PATH" $(venv) -m auditwheel repair --plat auto -w build/wheels '$(BUILD)'/bare/*.whl
 
 unit-tests:  ## unit tests; DEBUG=1 tests=tests/unit/test_X.pf: of a module
-	@$(foreach test,$(filter-out $(wildcard $(tests)),$(tests)),$(error $(test): is no file with unit tests; they are in $(suites)/test_*.pf))
+	@$(foreach test,$(filter-out $(wildcard $(tests)),$(tests)),$(error $(test): is no file with unit tests; $(or \
+	  $(patsubst %,did you mean %,$(wildcard $(suites)/$(basename $(notdir $(test))).pf)),they are in $(suites)/test_*.pf)))
 	@$(if $(PFUNIT_DIR),$(or $(if $(pfunit_mk),:),$(error PFUNIT_DIR=$(PFUNIT_DIR): no pFUnit is installed there (include/PFUNIT.mk is missing))),:)
 	@+$(build) $(BUILD)/unit_tests
 	@LIMIT=$${LIMIT:-$(if $(filter -O0,$(OPT)),900,300)} tests/support/run_unit_tests.sh \
@@ -407,9 +408,14 @@ distclean: clean
 
 nearest = import difflib, sys; near = difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1); \
   print(*(f"; did you mean {name}?" for name in near))
+# Folders are no targets either: otherwise `make tests` would do nothing and say that all is done.
+folders := $(filter-out $(targets),$(patsubst %/,%,$(wildcard */)))
+.PHONY: $(folders)
+$(folders):
+	@$(no_target)
 .DEFAULT:
-	@echo "There is no target and no file $@$$(python3 -c '$(nearest)' '$@' $(targets) 2>/dev/null)" >&2; \
-	  echo '`make help` lists the targets.' >&2; exit 2
+	@$(no_target)
+no_target = echo "There is no target $@$$(python3 -c '$(nearest)' '$@' $(targets) 2>/dev/null) (make help lists the targets)" >&2; exit 2
 
 # The targets that match, or do not match, the four that beginners need.
 described = awk -F ':.*  \#\# ' '/^[a-z-]+:.*  \#\# / && $$1 $1 /^(demo|lab|film|test)$$/ { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
