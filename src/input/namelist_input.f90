@@ -517,7 +517,9 @@ contains
       if (g > 0) advice = did_you_mean(trim(self%found(g)%name)//"."//text(:equals - 1))
       call self%problems%add(line, plain(group), "unknown group; "//advice)
     else
-      call self%find_group(group, instance, line, g)
+      g = 0       ! an unknown variable of several groups is not called ambiguous as well
+      if (row > 0 .or. instance /= "" .or. count(self%found(:self%n)%name == group) == 1) &
+        call self%find_group(group, instance, line, g)
       if (row == 0) call self%report_unknown(group, name, line, g)
       if (row == 0 .or. g == 0) return
       if (equals == len(text) .and. element == 0) then
