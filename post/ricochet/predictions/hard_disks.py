@@ -194,8 +194,8 @@ def published(eta: float, count: int, periodic: bool) -> float:
     """
     if FLUID[-1, 0] < eta < 0.72:
         return math.nan
-    count = count if periodic else math.inf
-    return float(crystal(eta, count) if eta >= 0.72 else simulated_finite(eta, count))
+    number = count if periodic else math.inf
+    return float(crystal(eta, number) if eta >= 0.72 else simulated_finite(eta, number))
 
 
 def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
