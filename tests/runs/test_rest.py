@@ -144,6 +144,21 @@ def test_without_gravity_the_run_ends_with_the_last_collision_whatever_else_is_d
     assert disk.time == 0.75
 
 
+@pytest.mark.parametrize("more", ["stop.time=99", "run.seed=1"])
+def test_a_run_with_a_source_comes_to_rest_when_its_last_disk_has(ricochet, tmp_path, more):
+    """Each disk stops at the first wall that it touches. No disk enters after three."""
+    write_input(
+        tmp_path,
+        """&box upper = 10, 10 / &species radius = 0.1 count = 3 waiting = 3 /
+        &source region = 1, 9, 1, 9 interval = 1 velocity = 1, 0.5 /
+        &contact wall_restitution = 0 restitution = 0 / &stop at_rest = .true. /""",
+    )
+    run = ricochet(*COMMAND, f"--set={more}")
+    assert run.returncode == FINISHED
+    assert "\nside_collisions = 3\n" in run.stdout and "\nkinetic_energy = 0\n" in run.stdout
+    assert read_run(tmp_path / "gas.h5").time[-1] < 3 + 8.9  # entry of the last, way to the wall
+
+
 def test_at_rest_is_no_rule_where_it_is_false(ricochet, tmp_path):
     write_input(tmp_path, BALL.format(height=2, restitution=0.5, more=""))
     run = ricochet(*COMMAND, "--set=stop.at_rest=.false.")
