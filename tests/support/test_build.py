@@ -118,7 +118,7 @@ def test_a_linker_that_cannot_redirect_gets_no_hints(small, tmp_path):
         ),
         (
             ["unit-tests", "tests=test_observables", "BUILD={}"],
-            "test_observables: is no file with unit tests; did you mean tests/unit/test_observables.pf",
+            "is no file with unit tests; did you mean tests/unit/test_observables.pf",
         ),
         (["tests"], "There is no target tests; did you mean test? (make help lists the targets)"),
         (["buidl"], "There is no target buidl (make help lists the targets)"),
