@@ -415,7 +415,7 @@ $(folders):
 	@$(no_target)
 .DEFAULT:
 	@$(no_target)
-no_target = echo "There is no target $@$$(python3 -c '$(nearest)' '$@' $(targets) 2>/dev/null) (make help lists the targets)" >&2; exit 2
+no_target = echo "There is no target$(if $(wildcard $@),, and no file) $@$$(python3 -c '$(nearest)' '$@' $(targets) 2>/dev/null) (make help lists the targets)" >&2; exit 2
 
 # The targets that match, or do not match, the four that beginners need.
 described = awk -F ':.*  \#\# ' '/^[a-z-]+:.*  \#\# / && $$1 $1 /^(demo|lab|film|test)$$/ { printf "  make %-12s %s\n", $$1, $$2 }' Makefile

@@ -121,7 +121,7 @@ def test_a_linker_that_cannot_redirect_gets_no_hints(small, tmp_path):
             "is no file with unit tests; did you mean tests/unit/test_observables.pf",
         ),
         (["tests"], "There is no target tests; did you mean test? (make help lists the targets)"),
-        (["buidl"], "There is no target buidl (make help lists the targets)"),
+        (["buidl"], "There is no target and no file buidl (make help lists the targets)"),
         (["BUILD=/proc/build"], "Cannot write to /proc/build; BUILD=folder takes another"),
         (["install", "PREFIX=here"], "write folders that begin with /"),
         (["film"], "make film INPUT=input/crater.nml"),
