@@ -75,8 +75,8 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
     """Return the lag, in frames, at which D is measured.
 
-    This lag is the time in which sound crosses the box, but at most 1/8 of the shortest run. At
-    longer lags diffusion depends on the size of the box.
+    This lag is the time in which sound crosses the box and returns from its periodic images, but
+    at most 1/8 of the shortest run. At longer lags D continues to grow; see laws, "Diffusion".
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
     kt = td.temperature(run).mean
