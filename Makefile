@@ -276,7 +276,7 @@ film: $(if $(wildcard $(BUILD)/ricochet),,all)  ## runs INPUT=FILE.nml SET="grou
 	$(BUILD)/ricochet '$(INPUT)' -o '$(name).h5' --force $(addprefix --set ,$(SET))
 	$(PYTHON) post/player.py '$(name).h5' -o '$(name).html' --open
 
-lab:  ## sets up, builds, opens the laboratory in your browser
+lab:  ## builds, opens the laboratory; post/lab.py opens no browser
 	@.ci/set-up demo
 	@$(MAKE) $(jobs) all library
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) post/lab.py --open

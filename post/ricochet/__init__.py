@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from . import packages as packages  # imported first, because it reports missing packages
 from .aliases import Aliases
 from .exchange.bridges import mdanalysis_universe
-from .reading.files import RunError
+from .reading.files import RunError, did_you_mean
 from .reading.frames import Frames, Series
 from .reading.reader import Event, EventLog, Frame, Obstacle, Run, read_run
 from .reports import analyse
@@ -117,7 +117,8 @@ else:
         """Return the module with the given short name."""
         if name in ALIASES.modules:
             return import_module(f"{__name__}.{name}")
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        near = did_you_mean(name, __dir__())
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{near}")
 
     def __dir__() -> list[str]:
         return sorted({*globals(), *ALIASES.modules})

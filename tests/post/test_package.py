@@ -51,6 +51,8 @@ def test_type_checkers_see_the_modules_that_are_there():
 def test_a_name_that_is_not_there_is_an_error():
     with pytest.raises(AttributeError, match="module 'ricochet' has no attribute 'structur'"):
         _ = ricochet.structur
+    with pytest.raises(AttributeError, match=r"'load_run'; did you mean read_run\?$"):
+        _ = ricochet.load_run
     with pytest.raises(ModuleNotFoundError):
         importlib.import_module("ricochet.structur")
 
