@@ -7,7 +7,7 @@ module command_line
   use hdf5_handle, only: hdf5_version
   use run_files, only: check_name
   use system, only: print_text
-  use texts, only: eol, nearest_word, shown, text_t
+  use texts, only: did_you_mean, eol, nearest_word, shown, text_t
   use version, only: program_version
   use variable_help, only: defaults_text, explain, variables_text
   implicit none
@@ -188,7 +188,7 @@ contains
     if (index(text, "=") > 0 .or. self%k == size(self%arguments)) return
     associate (next => self%arguments(self%k + 1)%text)
       if (index(next, "-") /= 1 .and. index(next//"|", ".nml|") == 0) &
-        call self%refuse("--set "//text//": = is missing; did you mean --set "//text//"="//next//"?")
+        call self%refuse("--set "//text//": = is missing; "//did_you_mean("--set "//text//"="//next))
     end associate
   end subroutine expect_assignment
 
@@ -201,7 +201,7 @@ contains
 
     meant = nearest_word(name, options)
     if (meant == "" .and. index(name, "--") /= 1) meant = nearest_word("-"//name, options)
-    if (meant /= "") meant = "did you mean "//meant//"?"
+    if (meant /= "") meant = did_you_mean(meant)
     if (meant == "") meant = "see --help; put -- before a file name that begins with -"
     call self%refuse("unknown option "//shown(name)//"; "//meant)
   end subroutine report_unknown

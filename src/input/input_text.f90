@@ -7,7 +7,7 @@ module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
   use system, only: file_size, is_folder, names_beside, read_file
-  use texts, only: byte_order_mark, digits, eol, letters, nearest_word, shown, written
+  use texts, only: byte_order_mark, did_you_mean, digits, eol, letters, nearest_word, shown, written
   implicit none
   private
   public :: read_text, unix_lines
@@ -113,7 +113,7 @@ contains
     if (advice == "") return
     name = path(:index(path, "/", back=.true.))//advice//extension
     if (file_size(name) < 0) name = inputs//advice//extension
-    advice = "; did you mean "//name//"?"
+    advice = "; "//did_you_mean(name)
   end function advice
 
   !> Normalises the line ends of a text to line feeds, and removes a byte order mark.

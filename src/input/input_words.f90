@@ -7,7 +7,7 @@ module input_words
   use input_groups, only: value_t, text_length
   use old_names, only: new_name
   use variables, only: allowed, largest, variable_t, smallest, table, words_of
-  use texts, only: counted, digits, lower_case, nearest_word, shown, written
+  use texts, only: counted, did_you_mean, digits, lower_case, nearest_word, shown, written
   implicit none
   private
   public :: store_values, read_real
@@ -101,7 +101,7 @@ contains
       if (tokens(k + 1)%first /= tokens(k)%last + 2) return         ! not only a comma between the numbers
       if (verify(content(text, tokens(k + 1)), digits) > 0) return
     end do
-    hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))//"? the decimal sign is a point"
+    hint = "; "//did_you_mean(content(text, tokens(1))//"."//content(text, tokens(2)))//" the decimal sign is a point"
   end function decimal_hint
 
   !> Checks one word, and stores its value after the first n values.
@@ -166,7 +166,7 @@ contains
       problem = "the text has "//written(len(word))//" bytes; allowed: up to "//written(text_length)
     else if (row%choices /= "" .and. all(words_of(row%choices) /= word)) then
       meant = nearest_word(word, words_of(row%choices))
-      if (meant /= "") meant = "did you mean """//meant//"""? "
+      if (meant /= "") meant = did_you_mean(""""//meant//"""")//" "
       problem = shown(word)//" is not allowed; "//meant//"allowed: "//allowed(row)
       meant = new_name(row%group, row%name, word)
       if (meant /= "") problem = "'"//word//"' is called '"//meant//"' now"
