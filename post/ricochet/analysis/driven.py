@@ -16,6 +16,11 @@ TimeSeries = tuple[np.ndarray, np.ndarray]  # times (S,) and values (S,)
 Curves = dict[str, TimeSeries]  # by species; "" stands for all disks
 
 
+def second_half(time: np.ndarray) -> np.ndarray:
+    """Return which samples (S,) belong to the second half of a run."""
+    return time >= (time[0] + time[-1]) / 2
+
+
 def temperature(run: Run) -> Curves:
     """Return the temperature of the motion relative to the mean velocity as a function of time."""
     if run.n_disks < 2:
@@ -45,7 +50,7 @@ def species_ratio(run: Run) -> SeriesMean | None:
     if not curves.keys() >= {*names}:
         return None
     time, _ = curves[""]
-    late = time >= (time[0] + time[-1]) / 2
+    late = second_half(time)
     return correlated_mean(*(curves[name][1][late] for name in names))
 
 
@@ -60,7 +65,7 @@ def components(run: Run) -> Curves:
 def keeps_energy(run: Run) -> bool:
     """Return whether the kinetic energy is conserved in the second half of the run."""
     time, energy = run.observable("all/kinetic_energy")
-    late = energy[time >= (time[0] + time[-1]) / 2]
+    late = energy[second_half(time)]
     return bool(np.ptp(late) < ROUNDING * np.max(late, initial=0))
 
 
@@ -82,15 +87,9 @@ def collision_loss(run: Run) -> SeriesMean:
     disks are correlated, as in a flow, a collision dissipates less.
     """
     time, kt = temperature(run)[""]
-    late = time >= (time[0] + time[-1]) / 2
-    lost, collisions, kt = (
-        each[late]
-        for each in (
-            run.observable("dissipated_energy").value,
-            run.collisions_per_disk.value * run.n_disks / 2,
-            kt,
-        )
-    )
+    late = second_half(time)
+    lost, kt = run.observable("dissipated_energy").value[late], kt[late]
+    collisions = run.collisions_per_disk.value[late] * run.n_disks / 2
     expected = (1 - run.restitution**2) * (kt[1:] + kt[:-1]) / 2 * np.diff(collisions)
     return correlated_mean(np.diff(lost), expected)
 

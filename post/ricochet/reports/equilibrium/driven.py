@@ -109,7 +109,7 @@ def found_in(runs: list[Run], quantity: Quantity) -> Found:
 def late(curve: TimeSeries, compared: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """Return the values in the second half of a curve, which are compared with the prediction."""
     time, value = curve
-    return compared(value[time >= (time[0] + time[-1]) / 2])
+    return compared(value[driven.second_half(time)])
 
 
 def members_of(group: Group, species: str, show: str, halves: list[np.ndarray]) -> list[SeriesMean]:
